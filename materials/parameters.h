@@ -1,0 +1,66 @@
+#pragma once
+// The named parameters of one element of a scene file, as models and the scene reader see them.
+//
+// Names are in snake_case whatever the file's spelling: the reader turns alphaU into alpha_u and intIOR into int_ior.
+// Every query marks its parameter as used, so that what nobody asked for can be reported instead of ignored.
+
+#include <cstddef>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "materials/bsdf.h"
+#include "materials/texture.h"
+#include "materials/vec.h"
+
+namespace lobe {
+
+/// A parameter is missing or has a wrong value. The reader adds file, line and column.
+class ParameterError : public std::runtime_error {
+ public:
+  ParameterError(std::string parameter, const std::string& message)
+      : std::runtime_error(message), name(std::move(parameter)) {}
+  std::string name;  ///< empty: the element as a whole
+};
+
+using ParameterValue = std::variant<bool, double, std::string, Rgb, Eigen::Matrix4d, TexturePtr>;
+
+class Parameters {
+ public:
+  /// location: where the parameter stands in its file (an offset), handed back by unused() and location().
+  void set(const std::string& name, ParameterValue value, std::ptrdiff_t location = 0);
+  void addChild(BsdfPtr bsdf) { children_.push_back(std::move(bsdf)); }
+
+  bool has(std::string_view name) const;
+
+  // Each returns the fallback when there is no such parameter and throws ParameterError when it has another type.
+  bool flag(std::string_view name, bool fallback) const;
+  double number(std::string_view name, double fallback) const;
+  std::string text(std::string_view name, std::string fallback) const;
+  Rgb colour(std::string_view name, const Rgb& fallback) const;               ///< from rgb, or a number as grey
+  TexturePtr texture(std::string_view name, const Rgb& fallback) const;       ///< from texture, rgb or number
+  Eigen::Matrix4d transform(std::string_view name) const;                     ///< identity when missing
+
+  const std::vector<BsdfPtr>& children() const { return children_; }
+  /// The only nested BSDF; ParameterError when there are none or several.
+  BsdfPtr onlyChild() const;
+
+  std::vector<std::string> unused() const;
+  std::ptrdiff_t location(std::string_view name) const;  ///< 0 when unknown
+
+ private:
+  struct Entry {
+    ParameterValue value;
+    std::ptrdiff_t location;
+    mutable bool used = false;
+  };
+  const Entry* find(std::string_view name) const;
+
+  std::map<std::string, Entry, std::less<>> entries_;
+  std::vector<BsdfPtr> children_;
+};
+
+}  // namespace lobe

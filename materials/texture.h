@@ -1,0 +1,24 @@
+#pragma once
+// A colour that may vary over a surface.
+
+#include <memory>
+
+#include "materials/vec.h"
+
+namespace lobe {
+
+class Texture {
+ public:
+  virtual ~Texture() = default;
+  /// The linear colour at texture coordinate uv (v up, any real numbers; the texture wraps as it is set to).
+  virtual Rgb eval(const Vec2& uv) const = 0;
+  /// The mean colour over one period, used for decisions that must not depend on where the surface is hit.
+  virtual Rgb mean() const = 0;
+};
+
+using TexturePtr = std::shared_ptr<const Texture>;
+
+/// The same colour everywhere.
+TexturePtr constantTexture(const Rgb& colour);
+
+}  // namespace lobe

@@ -1,0 +1,83 @@
+#pragma once
+// Expectation maximisation on weighted points of the disc: the static form the fitter uses (Herholz et al. 2016) and the
+// stepwise on-line form with MAP priors that trains the illumination (Vorba et al. 2014).
+
+#include <span>
+
+#include "runtime/mixture/gaussian.h"
+
+namespace lobe {
+
+struct WeightedPoint {
+  Vec2 y;
+  float weight;  ///< ≥ 0 and finite; points of weight 0 are ignored
+};
+
+struct WeightedEmOptions {
+  int maxSweeps = 100;
+  double tolerance = 1e-4;      ///< relative change of the weighted log-likelihood that ends the iteration
+  double minVariance = 1e-9;    ///< floor of each eigenvalue of Σ, in disc units²
+};
+
+/// Fits in place by weighted EM (in double precision), starting from the given components; their number stays, weights sum
+/// to one, covariances stay positive definite. Returns the number of sweeps; 0 leaves the mixture as it was (no point has
+/// a positive weight).
+int weightedEm(std::span<const WeightedPoint> points, Mixture& mixture, const WeightedEmOptions& options = {});
+
+/// Σ w log G / Σ w over points of positive weight. −infinity when a point has density 0.
+double meanLogLikelihood(std::span<const WeightedPoint> points, std::span<const Gaussian> mixture, float background = 0);
+
+/// Priors and step sizes of the on-line form; the names are those of Vorba et al. 2014, Eq. 8–11.
+struct StepwiseEmOptions {
+  float stepExponent = 0.7f;      ///< η = (k+1)^(−exponent)
+  int samplesPerUpdate = 10;      ///< M step after this many samples
+  float priorA = 0.01f;
+  float priorB = 4e-3f;
+  float priorV = 0.01f;
+  float backgroundPrior = 8.0f;   ///< Dirichlet pseudo-count of the background component
+  float initialBackground = 0.5f;
+  float initialVariance = 0.31f;
+  float minDeterminant = 1e-11f;  ///< a covariance below is reset to the initial one
+  double tolerance = 1e-3;        ///< of the first fit
+  int maxSweeps = 250;            ///< of the first fit
+};
+
+/// An illumination mixture in training: u · 2cosθ/π + (1−u) · Σ π_k N_k over the disc, with its sufficient statistics.
+/// The background component 2cosθ/π (cosθ = 1 − |y|²) is what constant radiance makes of L cosθ.
+class StepwiseEm {
+ public:
+  /// components Gaussians, 1 ≤ components ≤ kMaxIlluminationComponents.
+  StepwiseEm(int components, const StepwiseEmOptions& options);
+
+  /// First fit: starts from the points themselves (deterministically) and sweeps until the likelihood settles. The
+  /// samples seen become points.size(). Points outside the disc or of weight ≤ 0 are ignored.
+  void fit(std::span<const WeightedPoint> points);
+
+  /// One sweep of on-line EM over new points.
+  void update(std::span<const WeightedPoint> points);
+
+  const Mixture& gaussians() const { return gaussians_; }  ///< weights sum to 1
+  float background() const { return background_; }         ///< u in [0,1]
+  long samplesSeen() const { return samples_; }
+  /// u · 2cosθ/π + (1−u) · G(y), over the disc's area.
+  float pdf(const Vec2& y) const;
+
+ private:
+  struct Statistics {
+    double weight = 0;                 // g_k
+    double x = 0, y = 0;               // s_k
+    double xx = 0, xy = 0, yy = 0;     // C_k
+  };
+  void sweep(std::span<const WeightedPoint> points, bool firstFit);
+  void maximise(long n);
+
+  StepwiseEmOptions options_;
+  Mixture gaussians_;
+  float background_;
+  std::vector<Statistics> statistics_;
+  double backgroundWeight_ = 0;
+  double totalWeight_ = 0;
+  long samples_ = 0;
+};
+
+}  // namespace lobe

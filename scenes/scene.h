@@ -1,0 +1,98 @@
+#pragma once
+// A scene as plain data: what a reader produces and renderer and fitter consume. World units are the file's.
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "materials/bsdf.h"
+#include "materials/image.h"
+#include "materials/texture.h"
+
+namespace lobe {
+
+/// World-space triangles. normals and uvs are empty or one per position. Geometric normals follow the winding
+/// (counter-clockwise seen from the front).
+struct TriangleMesh {
+  std::vector<Vec3> positions;
+  std::vector<Vec3> normals;
+  std::vector<Vec2> uvs;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+};
+
+/// A world-space sphere; the outside is the front unless flipped.
+struct Sphere {
+  Vec3 centre;
+  float radius;
+  bool flipped = false;
+};
+
+/// A flat disk spanned by two orthogonal edge vectors of equal length from the centre; u × v is the front's direction.
+/// uv: (radius, azimuth/2π) as Mitsuba has it.
+struct Disk {
+  Vec3 centre;
+  Vec3 u, v;
+};
+
+using Geometry = std::variant<TriangleMesh, Sphere, Disk>;
+
+struct AreaEmitter {
+  TexturePtr radiance;  ///< emitted on the front side only
+};
+
+struct Shape {
+  std::string name;  ///< for messages: the file's id, or the mesh's file name
+  Geometry geometry;
+  int material = -1;  ///< index into Scene::materials
+  std::optional<AreaEmitter> emitter;
+};
+
+struct Material {
+  std::string name;  ///< the file's id, or "unnamed-N"
+  BsdfPtr bsdf;
+};
+
+/// Radiance from infinitely far, in latitude-longitude form. The image point (u, v), v down, shows the radiance that
+/// arrives from local direction (sin(2πu) sin(πv), cos(πv), −cos(2πu) sin(πv)): +y is up (Mitsuba's convention).
+struct Environment {
+  Image radiance;  ///< a 1×1 image for a constant environment; scale already applied
+  Eigen::Matrix3f toWorld = Eigen::Matrix3f::Identity();  ///< rotation
+};
+
+/// A pinhole. Local +z is the viewing direction, +y up, +x left (Mitsuba's convention).
+struct Camera {
+  Eigen::Matrix4f toWorld = Eigen::Matrix4f::Identity();
+  float horizontalFov = 60;  ///< degrees, over the full image width (already converted from the file's axis for the
+                             ///< size below)
+  int width = 768;
+  int height = 576;
+  /// The field of view as the file states it, to convert again when the size is overridden.
+  float fov = 60;
+  std::string fovAxis = "x";
+};
+
+/// What kind of reconstruction filter the file asks for; sampled by importance, so each sample touches one pixel.
+struct PixelFilter {
+  enum class Kind { box, tent, gaussian } kind = Kind::box;
+  float radius = 0.5f;
+  float stddev = 0.5f;
+};
+
+struct Scene {
+  std::vector<Shape> shapes;
+  std::vector<Material> materials;
+  std::optional<Environment> environment;
+  Camera camera;
+  PixelFilter filter;
+  std::optional<int> maxDepth;        ///< as the file says, in segments; the command line overrides
+  std::vector<std::string> notes;     ///< what was read but replaced by ours (integrators, samplers, film options)
+  std::vector<std::string> warnings;  ///< what --lenient passed over
+};
+
+}  // namespace lobe
