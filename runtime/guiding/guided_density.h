@@ -1,0 +1,58 @@
+#pragma once
+// The density of directions at one vertex: a one-sample mixture of three strategies (product, BSDF, illumination).
+//
+// The product has two terms: that of the illumination's background component is exactly ρ cosθ, which the BSDF's own
+// sampler samples; that of the Gaussians is sampled in closed form. So the density is
+//   p(ω) = bsdfShare · p_bsdf(ω) + guidedPdf(ω),
+// and choosing between them is all the caller has to do. Frame: the disc of a local frame with z on the side of wo, in
+// which reflectance and illumination are both given. Densities are over solid angle.
+
+#include <optional>
+
+#include "runtime/guiding/illumination_cache.h"
+#include "runtime/guiding/reflectance.h"
+
+namespace lobe {
+
+/// How often each strategy is chosen; non-negative, sum 1, bsdf > 0 so that the whole hemisphere is covered.
+struct StrategyShares {
+  float product, bsdf, illumination;
+};
+
+/// Measured (targets): more of the product once a record has seen enough.
+inline constexpr StrategyShares kProductShares{0.85f, 0.10f, 0.05f};
+inline constexpr StrategyShares kUncertainProductShares{0.80f, 0.10f, 0.10f};
+inline constexpr float kUncertainSamples = 250;
+/// Vorba et al. 2014.
+inline constexpr StrategyShares kGuidedShares{0.0f, 0.5f, 0.5f};
+
+enum class Strategy { bsdf, product, illumination };
+
+class GuidedDensity {
+ public:
+  /// Views both; they outlive it. Where the product has no mass its share goes to the BSDF.
+  GuidedDensity(const Reflectance& reflectance, const IlluminationRecord& illumination, const StrategyShares& shares);
+
+  /// The probability of Strategy::bsdf.
+  float bsdfShare() const { return bsdfShare_; }
+
+  /// Chooses with `choice` uniform in [0,1), which is made uniform again for the strategy chosen.
+  Strategy choose(float& choice) const;
+
+  /// A local direction of the product or the illumination. nullopt: outside the disc, a sample of value zero.
+  std::optional<Vec3> sample(Strategy strategy, float choice, const Vec2& u) const;
+
+  /// The density of choosing and sampling product or illumination; 0 for wi.z ≤ 0.
+  float guidedPdf(const Vec3& wi) const;
+
+ private:
+  const Reflectance& reflectance_;
+  const IlluminationRecord& illumination_;
+  std::optional<Product> product_;
+  float bsdfShare_;
+  float productShare_ = 0;  // of the product's Gaussian term
+  float illuminationShare_;
+  float productScale_ = 0;  // productShare_ / mass of the product
+};
+
+}  // namespace lobe

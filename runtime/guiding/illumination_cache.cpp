@@ -1,0 +1,94 @@
+#include "runtime/guiding/illumination_cache.h"
+
+#include <algorithm>
+#include <bit>
+
+namespace lobe {
+namespace {
+
+constexpr float kMinNormalCosine = 0.75f;  // about 41°
+// Cells of half the largest radius: a record lies in few of them, and a cell holds few records.
+constexpr float kCellsPerUnit = 2.0f;
+
+Eigen::Vector3i cellOf(const Vec3& x, float inverseCellSize) {
+  return (x * inverseCellSize).array().floor().cast<int>();
+}
+
+std::size_t slotOf(std::uint64_t key, std::size_t tableSize) {
+  return (key * 0x9e3779b97f4a7c15ull) >> (64 - std::countr_zero(tableSize));
+}
+
+}  // namespace
+
+IlluminationCache::IlluminationCache(std::vector<IlluminationRecord> records, float unit)
+    : records_(std::move(records)), unit_(unit), inverseCellSize_(kCellsPerUnit / unit) {
+  struct Placement {
+    std::uint64_t key;
+    std::uint32_t record;
+  };
+  std::vector<Placement> placements;
+  for (std::uint32_t i = 0; i < records_.size(); ++i) {
+    const IlluminationRecord& r = records_[i];
+    const Eigen::Vector3i low = cellOf(r.position - Vec3::Constant(r.radius), inverseCellSize_);
+    const Eigen::Vector3i high = cellOf(r.position + Vec3::Constant(r.radius), inverseCellSize_);
+    for (int z = low.z(); z <= high.z(); ++z)
+      for (int y = low.y(); y <= high.y(); ++y)
+        for (int x = low.x(); x <= high.x(); ++x) placements.push_back({cellKey({x, y, z}), i});
+  }
+  std::ranges::sort(placements, {}, [](const Placement& p) { return std::pair(p.key, p.record); });
+
+  table_.assign(std::bit_ceil(2 * placements.size() + 2), Cell{0, 0, 0});
+  entries_.reserve(placements.size());
+  for (std::size_t i = 0; i < placements.size();) {
+    const std::uint64_t key = placements[i].key;
+    const auto begin = static_cast<std::uint32_t>(entries_.size());
+    for (; i < placements.size() && placements[i].key == key; ++i) {
+      const IlluminationRecord& r = records_[placements[i].record];
+      entries_.push_back({r.position, r.normal, r.radius * r.radius, placements[i].record});
+    }
+    std::size_t slot = slotOf(key, table_.size());
+    while (table_[slot].begin != table_[slot].end) slot = (slot + 1) & (table_.size() - 1);
+    table_[slot] = {key, begin, static_cast<std::uint32_t>(entries_.size())};
+  }
+}
+
+std::uint64_t IlluminationCache::cellKey(const Eigen::Vector3i& cell) const {
+  // 21 bits an axis: scenes of a million cells across, beyond which keys wrap and cells are shared, which is harmless.
+  constexpr std::uint64_t mask = (1u << 21) - 1;
+  return (static_cast<std::uint64_t>(cell.x()) & mask) | (static_cast<std::uint64_t>(cell.y()) & mask) << 21 |
+         (static_cast<std::uint64_t>(cell.z()) & mask) << 42;
+}
+
+const IlluminationCache::Cell* IlluminationCache::findCell(std::uint64_t key) const {
+  if (table_.empty()) return nullptr;
+  for (std::size_t slot = slotOf(key, table_.size());; slot = (slot + 1) & (table_.size() - 1)) {
+    const Cell& cell = table_[slot];
+    if (cell.begin == cell.end) return nullptr;
+    if (cell.key == key) return &cell;
+  }
+}
+
+const IlluminationRecord* IlluminationCache::find(const Vec3& x, const Vec3& n) const {
+  const Cell* cell = findCell(cellKey(cellOf(x, inverseCellSize_)));
+  if (!cell) return nullptr;
+  const IlluminationRecord* best = nullptr;
+  float bestCost = std::numeric_limits<float>::infinity();
+  for (std::uint32_t i = cell->begin; i < cell->end; ++i) {
+    const Entry& e = entries_[i];
+    const float distance2 = (x - e.position).squaredNorm();
+    const float cosine = n.dot(e.normal);
+    if (distance2 > e.radius2 || cosine < kMinNormalCosine) continue;
+    const float cost = std::sqrt(distance2) / unit_ + 2.0f * std::sqrt(std::max(0.0f, 1.001f - cosine));
+    if (cost < bestCost) {
+      bestCost = cost;
+      best = &records_[e.record];
+    }
+  }
+  return best;
+}
+
+std::size_t IlluminationCache::bytes() const {
+  return records_.size() * sizeof(IlluminationRecord) + entries_.size() * sizeof(Entry) + table_.size() * sizeof(Cell);
+}
+
+}  // namespace lobe

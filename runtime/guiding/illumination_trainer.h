@@ -1,0 +1,64 @@
+#pragma once
+// Trains illumination records from particles, pass by pass (Vorba et al. 2014, Sections 4 and 5).
+//
+// Results depend on the particles, the requests and their order, never on threads: records are placed one after another
+// in the order of the requests, and each is fitted by itself.
+
+#include <span>
+#include <vector>
+
+#include "runtime/guiding/illumination_cache.h"
+#include "runtime/guiding/particle.h"
+#include "runtime/mixture/em.h"
+
+namespace lobe {
+
+struct TrainingOptions {
+  int components = 8;           ///< Gaussians a record, 1 to 8
+  int neighbours = 250;         ///< particles a record is updated from, at most
+  float unitShare = 0.01f;      ///< the length u, as a share of the scene's bounding-box diagonal
+  float klThreshold = 5.0f;     ///< κ, how far in standard deviations a component may move before a record is invalid
+  StepwiseEmOptions em;
+
+  /// Throws std::runtime_error that names the field.
+  void validate() const;
+};
+
+class IlluminationTrainer {
+ public:
+  /// sceneDiagonal: of the bounding box, world units, > 0.
+  IlluminationTrainer(const TrainingOptions& options, float sceneDiagonal);
+
+  /// One pass: updates every record from the particles around it, then makes a record for each request that no record
+  /// serves yet and that has particles around it.
+  void learn(std::span<const Particle> particles, std::span<const RecordRequest> requests);
+
+  /// What has been learnt so far.
+  const IlluminationCache& cache() const { return cache_; }
+
+  float unit() const { return unit_; }
+  /// Share of records that have seen fewer than 5 particles a component.
+  double undersampledShare() const;
+
+ private:
+  struct Training {
+    Vec3 position, normal, tangent;
+    float radius;
+    float distance;  // mean distance that the light came from
+    StepwiseEm em;
+  };
+  class Neighbours;
+
+  void updateAll(const Neighbours& neighbours);
+  void place(const Neighbours& neighbours, std::span<const RecordRequest> requests);
+  void fitFrom(std::size_t first, const Neighbours& neighbours);
+  void shrinkRadius(Training& record) const;
+  void rebuildCache();
+
+  TrainingOptions options_;
+  float unit_;
+  std::vector<Training> records_;
+  IlluminationCache cache_;
+};
+
+}  // namespace lobe

@@ -1,0 +1,23 @@
+#pragma once
+// The reflectance of one surface point for one outgoing direction, in the form that the product needs.
+
+#include <array>
+#include <span>
+
+#include "runtime/mixture/gaussian.h"
+#include "runtime/mixture/product.h"
+
+namespace lobe {
+
+/// ρ over the disc of a local frame, without the cosine: constant + Σ weight_k N_k(y), luminance. Not normalised.
+struct Reflectance {
+  float constant = 0;  ///< albedo/π of the diffuse part
+  /// ∫ ρ p dA for p = 2cosθ/π, the light of a uniform environment: what the product makes of the background component.
+  float backgroundMass = 0;
+  int count = 0;
+  std::array<Gaussian, kMaxReflectanceComponents> components;
+
+  std::span<const Gaussian> gaussians() const { return {components.data(), static_cast<std::size_t>(count)}; }
+};
+
+}  // namespace lobe
