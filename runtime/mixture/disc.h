@@ -15,7 +15,9 @@ using Vec2 = Eigen::Vector2f;
 using Vec3 = Eigen::Vector3f;
 
 /// Unit direction with z ≥ 0 to a point of the closed unit disc.
-inline Vec2 toDisc(const Vec3& w) { return w.head<2>() / std::sqrt(1.0f + std::max(0.0f, w.z())); }
+inline Vec2 toDisc(const Vec3& w) {
+  return w.head<2>() / std::sqrt(1.0f + std::max(0.0f, w.z()));
+}
 
 /// Point of the closed unit disc to a unit direction with z ≥ 0.
 inline Vec3 fromDisc(const Vec2& y) {
@@ -24,9 +26,13 @@ inline Vec3 fromDisc(const Vec2& y) {
   return {y.x() * scale, y.y() * scale, std::max(0.0f, 1.0f - r2)};
 }
 
-inline bool insideDisc(const Vec2& y) { return y.squaredNorm() < 1.0f; }
+inline bool insideDisc(const Vec2& y) {
+  return y.squaredNorm() < 1.0f;
+}
 
 /// cosθ of the direction that y stands for.
-inline float discCosine(const Vec2& y) { return std::max(0.0f, 1.0f - y.squaredNorm()); }
+inline float discCosine(const Vec2& y) {
+  return std::max(0.0f, 1.0f - y.squaredNorm());
+}
 
 }  // namespace lobe

@@ -1,6 +1,6 @@
 #pragma once
-// Expectation maximisation on weighted points of the disc: the static form the fitter uses (Herholz et al. 2016) and the
-// stepwise on-line form with MAP priors that trains the illumination (Vorba et al. 2014).
+// Expectation maximisation on weighted points of the disc: the static form the fitter uses (Herholz et al. 2016) and
+// the stepwise on-line form with MAP priors that trains the illumination (Vorba et al. 2014).
 
 #include <span>
 
@@ -15,26 +15,27 @@ struct WeightedPoint {
 
 struct WeightedEmOptions {
   int maxSweeps = 100;
-  double tolerance = 1e-4;      ///< relative change of the weighted log-likelihood that ends the iteration
-  double minVariance = 1e-9;    ///< floor of each eigenvalue of Σ, in disc units²
+  double tolerance = 1e-4;    ///< relative change of the weighted log-likelihood that ends the iteration
+  double minVariance = 1e-9;  ///< floor of each eigenvalue of Σ, in disc units²
 };
 
-/// Fits in place by weighted EM (in double precision), starting from the given components; their number stays, weights sum
-/// to one, covariances stay positive definite. Returns the number of sweeps; 0 leaves the mixture as it was (no point has
-/// a positive weight).
+/// Fits in place by weighted EM (in double precision), starting from the given components; their number stays, weights
+/// sum to one, covariances stay positive definite. Returns the number of sweeps; 0 leaves the mixture as it was (no
+/// point has a positive weight).
 int weightedEm(std::span<const WeightedPoint> points, Mixture& mixture, const WeightedEmOptions& options = {});
 
 /// Σ w log G / Σ w over points of positive weight. −infinity when a point has density 0.
-double meanLogLikelihood(std::span<const WeightedPoint> points, std::span<const Gaussian> mixture, float background = 0);
+double meanLogLikelihood(std::span<const WeightedPoint> points, std::span<const Gaussian> mixture,
+                         float background = 0);
 
 /// Priors and step sizes of the on-line form; the names are those of Vorba et al. 2014, Eq. 8–11.
 struct StepwiseEmOptions {
-  float stepExponent = 0.7f;      ///< η = (k+1)^(−exponent)
-  int samplesPerUpdate = 10;      ///< M step after this many samples
+  float stepExponent = 0.7f;  ///< η = (k+1)^(−exponent)
+  int samplesPerUpdate = 10;  ///< M step after this many samples
   float priorA = 0.01f;
   float priorB = 4e-3f;
   float priorV = 0.01f;
-  float backgroundPrior = 8.0f;   ///< Dirichlet pseudo-count of the background component
+  float backgroundPrior = 8.0f;  ///< Dirichlet pseudo-count of the background component
   float initialBackground = 0.5f;
   float initialVariance = 0.31f;
   float minDeterminant = 1e-11f;  ///< a covariance below is reset to the initial one
@@ -64,12 +65,14 @@ class StepwiseEm {
 
  private:
   struct Statistics {
-    double weight = 0;                 // g_k
-    double x = 0, y = 0;               // s_k
-    double xx = 0, xy = 0, yy = 0;     // C_k
+    double weight = 0;              // g_k
+    double x = 0, y = 0;            // s_k
+    double xx = 0, xy = 0, yy = 0;  // C_k
   };
-  void sweep(std::span<const WeightedPoint> points, bool firstFit);
-  void maximise(long n);
+  template <int lanes>
+  class Sweep;
+  void start(std::span<const WeightedPoint> points);
+  double sweep(std::span<const WeightedPoint> points, long priorLimit);
 
   StepwiseEmOptions options_;
   Mixture gaussians_;

@@ -14,7 +14,8 @@ namespace lobe {
 /// A symmetric 2×2 matrix. Plain data: stored in caches as it is.
 struct Covariance {
   float xx, xy, yy;
-  float determinant() const { return xx * yy - xy * xy; }
+  /// In double, where both products are exact: for long thin lobes nearly all of their digits cancel.
+  float determinant() const { return static_cast<float>(static_cast<double>(xx) * yy - static_cast<double>(xy) * xy); }
 };
 
 /// One weighted component. weight ≥ 0; covariance positive definite. Plain data: stored in caches as it is.

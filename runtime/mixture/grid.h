@@ -18,8 +18,8 @@ struct DirectionGrid {
   /// θ = 90°·(t/2 + (1 − (1−t)³)/2) with t = (index + ½)/count, so that neither end is hit exactly.
   Vec3 direction(int index) const;
 
-  /// The entry nearest to w (z ≥ 0, unit). Elevations: nearest in elevation, by inverting the spacing. Fibonacci: nearest
-  /// in angle among the upper-hemisphere points, in constant time (Keinert et al. 2015).
+  /// The entry nearest to w (z ≥ 0, unit). Elevations: nearest in elevation, by inverting the spacing. Fibonacci:
+  /// nearest in angle among the upper-hemisphere points, in constant time (Keinert et al. 2015).
   int nearest(const Vec3& w) const;
 };
 

@@ -17,13 +17,16 @@ namespace lobe {
 inline constexpr int kMaxReflectanceComponents = 32;
 inline constexpr int kMaxIlluminationComponents = 16;
 
+/// A product of less mass counts as none: its factors' densities would lose digits to underflow.
+inline constexpr float kMinMass = 1e-30f;
+
 /// The product density of one pair of factors. Views the factors; they outlive it. No allocation.
 class Product {
  public:
-  /// constant ≥ 0 is the height of a flat term added to the reflectance.
+  /// constant ≥ 0 is the height of a flat term added to the reflectance. Throws if a factor has too many components.
   Product(std::span<const Gaussian> reflectance, float constant, std::span<const Gaussian> illumination);
 
-  /// Z; 0 when it underflows or is not finite: then there is no product, and neither sample nor pdf may be called.
+  /// Z; 0 when it is below kMinMass or not finite: then there is no product, and neither sample nor pdf may be called.
   float mass() const { return mass_; }
 
   /// A point of the plane (perhaps outside the disc) of density pdf.

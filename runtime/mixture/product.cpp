@@ -1,0 +1,82 @@
+#include "runtime/mixture/product.h"
+
+#include <limits>
+#include <stdexcept>
+
+namespace lobe {
+
+namespace {
+
+// Σ1 S⁻¹ as a full matrix, S = Σ1 + Σ2. In double: it is done once a sample, and it keeps Σ1 S⁻¹ Σ2 positive definite.
+struct Gain {
+  double a, b, c, d;
+};
+
+Gain gain(const Covariance& one, const Covariance& two) {
+  const double sxx = static_cast<double>(one.xx) + two.xx, sxy = static_cast<double>(one.xy) + two.xy,
+               syy = static_cast<double>(one.yy) + two.yy;
+  const double inverse = 1 / (sxx * syy - sxy * sxy);
+  return {(one.xx * syy - one.xy * sxy) * inverse, (one.xy * sxx - one.xx * sxy) * inverse,
+          (one.xy * syy - one.yy * sxy) * inverse, (one.yy * sxx - one.xy * sxy) * inverse};
+}
+
+// The normalised product of two components; the weight is not set. `narrow` is the one with the smaller trace: the mean
+// is a correction to its mean, Σ2 S⁻¹ μ1 + Σ1 S⁻¹ μ2 = μ1 + Σ1 S⁻¹ (μ2 − μ1), which loses no digits.
+Gaussian pairProduct(const Gaussian& narrow, const Gaussian& wide) {
+  const Gain k = gain(narrow.cov, wide.cov);
+  const double dx = static_cast<double>(wide.meanX) - narrow.meanX, dy = static_cast<double>(wide.meanY) - narrow.meanY;
+  return {1.0f, static_cast<float>(narrow.meanX + k.a * dx + k.b * dy),
+          static_cast<float>(narrow.meanY + k.c * dx + k.d * dy),
+          Covariance{static_cast<float>(k.a * wide.cov.xx + k.b * wide.cov.xy),
+                     static_cast<float>(k.a * wide.cov.xy + k.b * wide.cov.yy),
+                     static_cast<float>(k.c * wide.cov.xy + k.d * wide.cov.yy)}};
+}
+
+// a b N(μ1 − μ2 | 0, Σ1 + Σ2).
+float pairWeight(const Gaussian& one, const Gaussian& two) {
+  const Covariance sum{one.cov.xx + two.cov.xx, one.cov.xy + two.cov.xy, one.cov.yy + two.cov.yy};
+  return one.weight * two.weight * normalPdf({1.0f, two.meanX, two.meanY, sum}, one.mean());
+}
+
+float trace(const Covariance& c) {
+  return c.xx + c.yy;
+}
+
+}  // namespace
+
+Product::Product(std::span<const Gaussian> reflectance, float constant, std::span<const Gaussian> illumination)
+    : reflectance_(reflectance), illumination_(illumination), constant_(constant) {
+  if (reflectance.size() > kMaxReflectanceComponents || illumination.size() > kMaxIlluminationComponents)
+    throw std::runtime_error("a product's factor has too many components");
+  float sum = 0;
+  float* pair = pairs_.data();
+  for (const Gaussian& one : reflectance)
+    for (const Gaussian& two : illumination) sum += * pair++ = pairWeight(one, two);
+  for (const Gaussian& two : illumination) sum += * pair++ = constant * two.weight;
+  // The comparison is false for NaN as well.
+  mass_ = sum >= kMinMass && sum < std::numeric_limits<float>::infinity() ? sum : 0.0f;
+}
+
+Vec2 Product::sample(float choice, const Vec2& u) const {
+  const std::size_t stride = illumination_.size(), count = (reflectance_.size() + 1) * stride;
+  float left = choice * mass_;
+  // Rounding may leave a little at the end: then the last pair that has weight is taken.
+  std::size_t chosen = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    if (pairs_[k] <= 0) continue;
+    chosen = k;
+    if (left < pairs_[k]) break;
+    left -= pairs_[k];
+  }
+  const Gaussian& two = illumination_[chosen % stride];
+  if (chosen / stride == reflectance_.size()) return sampleNormal(two, u);
+  const Gaussian& one = reflectance_[chosen / stride];
+  const bool ordered = trace(one.cov) <= trace(two.cov);
+  return sampleNormal(ordered ? pairProduct(one, two) : pairProduct(two, one), u);
+}
+
+float Product::pdf(const Vec2& y) const {
+  return (constant_ + mixturePdf(reflectance_, y)) * (mixturePdf(illumination_, y) / mass_);
+}
+
+}  // namespace lobe

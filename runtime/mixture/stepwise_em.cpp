@@ -1,0 +1,225 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+
+#include "runtime/mixture/eigenvalue_floor.h"
+#include "runtime/mixture/em.h"
+#include "runtime/mixture/fast_exp.h"
+#include "runtime/mixture/product.h"
+
+namespace lobe {
+
+namespace {
+
+constexpr float kInvPi = std::numbers::inv_pi_v<float>;
+
+bool counts(const WeightedPoint& p) {
+  return p.weight > 0 && std::isfinite(p.weight) && insideDisc(p.y);
+}
+
+float backgroundPdf(const Vec2& y) {
+  return 2.0f * kInvPi * discCosine(y);
+}
+
+}  // namespace
+
+// The state of one sweep, taken from and put back into the mixture's. Components lie side by side, padded with dead
+// ones of weight 0 to a fixed number of lanes, so that the loops over them vectorise. No allocation.
+template <int lanes>
+class StepwiseEm::Sweep {
+ public:
+  explicit Sweep(const StepwiseEm& em);
+  void store(StepwiseEm& em) const;
+
+  /// Takes one point in with the step η; returns the density at it before.
+  float add(const WeightedPoint& point, double step);
+  /// The M step with the priors' counterweight n.
+  void maximise(double n);
+
+ private:
+  void prepare();
+  Covariance covariance(int k, double n) const;
+
+  const StepwiseEmOptions& options_;
+  int count_;
+  std::array<Gaussian, lanes> gaussians_{};
+  float background_;
+  double totalWeight_, backgroundWeight_;
+  // Of the E step: means, the inverse Cholesky factor's parts, and (1−u) π / (2π sqrt|Σ|).
+  alignas(64) std::array<float, lanes> x_{}, y_{}, slope_{}, along_{}, across_{}, scale_{};
+  alignas(64) std::array<double, lanes> g_{}, sx_{}, sy_{}, cxx_{}, cxy_{}, cyy_{};
+};
+
+template <int lanes>
+StepwiseEm::Sweep<lanes>::Sweep(const StepwiseEm& em)
+    : options_(em.options_),
+      count_(static_cast<int>(em.gaussians_.size())),
+      background_(em.background_),
+      totalWeight_(em.totalWeight_),
+      backgroundWeight_(em.backgroundWeight_) {
+  for (int k = 0; k < count_; ++k) {
+    const Statistics& s = em.statistics_[k];
+    gaussians_[k] = em.gaussians_[k];
+    g_[k] = s.weight, sx_[k] = s.x, sy_[k] = s.y, cxx_[k] = s.xx, cxy_[k] = s.xy, cyy_[k] = s.yy;
+  }
+  prepare();
+}
+
+template <int lanes>
+void StepwiseEm::Sweep<lanes>::store(StepwiseEm& em) const {
+  for (int k = 0; k < count_; ++k) {
+    em.gaussians_[k] = gaussians_[k];
+    em.statistics_[k] = {g_[k], sx_[k], sy_[k], cxx_[k], cxy_[k], cyy_[k]};
+  }
+  em.background_ = background_;
+  em.totalWeight_ = totalWeight_;
+  em.backgroundWeight_ = backgroundWeight_;
+}
+
+template <int lanes>
+void StepwiseEm::Sweep<lanes>::prepare() {
+  for (int k = 0; k < count_; ++k) {
+    const Gaussian& g = gaussians_[k];
+    const float det = g.cov.determinant();
+    x_[k] = g.meanX;
+    y_[k] = g.meanY;
+    slope_[k] = g.cov.xy / g.cov.xx;
+    along_[k] = -0.5f / g.cov.xx;
+    across_[k] = -0.5f * g.cov.xx / det;
+    scale_[k] = (1.0f - background_) * g.weight * (0.5f * kInvPi) / std::sqrt(det);
+  }
+}
+
+template <int lanes>
+float StepwiseEm::Sweep<lanes>::add(const WeightedPoint& point, double step) {
+  const float px = point.y.x(), py = point.y.y();
+  alignas(64) std::array<float, lanes> density;
+  float sum = 0;
+  for (int k = 0; k < lanes; ++k) {
+    const float dx = px - x_[k], dy = py - y_[k] - slope_[k] * dx;
+    density[k] = scale_[k] * expNegative(dx * dx * along_[k] + dy * dy * across_[k]);
+  }
+  for (int k = 0; k < lanes; ++k) sum += density[k];
+  const float flat = background_ * backgroundPdf(point.y);
+  const float total = sum + flat;
+  const double keep = 1 - step, weight = step * point.weight;
+  totalWeight_ = keep * totalWeight_ + weight;
+  // Where every density underflows the point counts for the background.
+  const double scale = total > 0 ? weight / total : 0;
+  backgroundWeight_ = keep * backgroundWeight_ + (total > 0 ? scale * flat : weight);
+  const double x = px, y = py, xx = x * x, xy = x * y, yy = y * y;
+  for (int k = 0; k < lanes; ++k) {
+    const double q = scale * density[k];
+    g_[k] = keep * g_[k] + q;
+    sx_[k] = keep * sx_[k] + q * x;
+    sy_[k] = keep * sy_[k] + q * y;
+    cxx_[k] = keep * cxx_[k] + q * xx;
+    cxy_[k] = keep * cxy_[k] + q * xy;
+    cyy_[k] = keep * cyy_[k] + q * yy;
+  }
+  return total;
+}
+
+// Σ_k = (b I + n V_k)/(a + n u_k). V_k is the scatter over the weight of all points.
+template <int lanes>
+Covariance StepwiseEm::Sweep<lanes>::covariance(int k, double n) const {
+  const double mx = sx_[k] / g_[k], my = sy_[k] / g_[k], perWeight = n / totalWeight_;
+  const double inverse = 1 / (options_.priorA + g_[k] * perWeight);
+  return withEigenvalueFloor(
+      (options_.priorB + (cxx_[k] - mx * sx_[k]) * perWeight) * inverse, (cxy_[k] - mx * sy_[k]) * perWeight * inverse,
+      (options_.priorB + (cyy_[k] - my * sy_[k]) * perWeight) * inverse, std::sqrt(options_.minDeterminant));
+}
+
+template <int lanes>
+void StepwiseEm::Sweep<lanes>::maximise(double n) {
+  // The mode under a Dirichlet prior over all K + 1 weights; Gaussians' weights are then relative to their sum.
+  const double pseudo = options_.priorV, perWeight = n / totalWeight_;
+  const double all = n + count_ * pseudo + options_.backgroundPrior;
+  background_ = static_cast<float>((backgroundWeight_ * perWeight + options_.backgroundPrior) / all);
+  double gaussianWeight = 0;
+  for (int k = 0; k < count_; ++k) gaussianWeight += g_[k] * perWeight + pseudo;
+  for (int k = 0; k < count_; ++k) {
+    gaussians_[k].weight = static_cast<float>((g_[k] * perWeight + pseudo) / gaussianWeight);
+    if (!(g_[k] > 1e-12 * totalWeight_)) continue;  // underflow: it keeps its shape
+    gaussians_[k].meanX = static_cast<float>(sx_[k] / g_[k]);
+    gaussians_[k].meanY = static_cast<float>(sy_[k] / g_[k]);
+    gaussians_[k].cov = covariance(k, n);
+  }
+  prepare();
+}
+
+StepwiseEm::StepwiseEm(int components, const StepwiseEmOptions& options)
+    : options_(options), background_(options.initialBackground) {
+  if (components < 1 || components > kMaxIlluminationComponents)
+    throw std::runtime_error("the number of components of an illumination mixture must be between 1 and 16");
+  const Covariance wide{options.initialVariance, 0.0f, options.initialVariance};
+  gaussians_.assign(static_cast<std::size_t>(components), {1.0f / static_cast<float>(components), 0.0f, 0.0f, wide});
+  statistics_.resize(gaussians_.size());
+}
+
+// Means at the middles of K equal shares of the points' weight, in the given order.
+void StepwiseEm::start(std::span<const WeightedPoint> points) {
+  double total = 0;
+  for (const WeightedPoint& p : points) total += counts(p) ? p.weight : 0;
+  const double share = total / static_cast<double>(gaussians_.size());
+  double passed = 0;
+  std::size_t k = 0;
+  for (const WeightedPoint& p : points) {
+    if (!counts(p)) continue;
+    passed += p.weight;
+    for (; k < gaussians_.size() && passed >= (static_cast<double>(k) + 0.5) * share; ++k) {
+      gaussians_[k].meanX = p.y.x();
+      gaussians_[k].meanY = p.y.y();
+    }
+  }
+}
+
+void StepwiseEm::fit(std::span<const WeightedPoint> points) {
+  const auto valid = std::count_if(points.begin(), points.end(), counts);
+  if (valid == 0) return;
+  *this = StepwiseEm(static_cast<int>(gaussians_.size()), options_);
+  start(points);
+  double previous = -std::numeric_limits<double>::infinity();
+  for (int i = 0; i < options_.maxSweeps; ++i) {
+    const double likelihood = sweep(points, valid);
+    if (std::abs(likelihood - previous) <= options_.tolerance * std::abs(likelihood)) break;
+    previous = likelihood;
+  }
+  samples_ = valid;
+}
+
+void StepwiseEm::update(std::span<const WeightedPoint> points) {
+  sweep(points, std::numeric_limits<long>::max());
+}
+
+// Returns the weighted mean of the log-likelihood as it was before each point was taken in.
+double StepwiseEm::sweep(std::span<const WeightedPoint> points, long priorLimit) {
+  const auto run = [&]<int lanes>() {
+    Sweep<lanes> state(*this);
+    double likelihood = 0, weight = 0;
+    int waiting = 0;
+    for (const WeightedPoint& p : points) {
+      if (!counts(p)) continue;
+      const float density = state.add(p, std::pow(static_cast<float>(samples_ + 1), -options_.stepExponent));
+      ++samples_;
+      likelihood += p.weight * std::log(std::max(density, std::numeric_limits<float>::min()));
+      weight += p.weight;
+      if (++waiting < options_.samplesPerUpdate) continue;
+      state.maximise(static_cast<double>(std::min(samples_, priorLimit)));
+      waiting = 0;
+    }
+    if (waiting > 0) state.maximise(static_cast<double>(std::min(samples_, priorLimit)));
+    state.store(*this);
+    return weight > 0 ? likelihood / weight : 0.0;
+  };
+  return gaussians_.size() <= 8 ? run.template operator()<8>() : run.template operator()<16>();
+}
+
+float StepwiseEm::pdf(const Vec2& y) const {
+  return background_ * backgroundPdf(y) + (1.0f - background_) * mixturePdf(gaussians_, y);
+}
+
+}  // namespace lobe
