@@ -38,9 +38,13 @@ class MappedFile {
 std::vector<std::byte> wrapPayload(const std::string& kind, std::span<const std::byte> payload);
 
 /// Checks magic, kind, version, size and hash, in this order, and returns the payload (8-byte aligned where bytes are).
-/// Throws std::runtime_error: "NAME: what is wrong and what to do". A newer minor version is read, a newer major refused.
+/// Throws std::runtime_error: "NAME: what is wrong and what to do". A newer minor version is read, a newer major
+/// refused.
 std::span<const std::byte> unwrapPayload(const std::string& kind, std::span<const std::byte> bytes,
                                          const std::string& name);
+
+/// The hash in the header of bytes that unwrapPayload has accepted: of all the file says.
+std::uint64_t containerHash(std::span<const std::byte> bytes);
 
 /// XXH3-64 of text.
 std::uint64_t hashText(const std::string& text);

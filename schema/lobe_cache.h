@@ -26,7 +26,6 @@ struct FitSettings {
   std::uint32_t components = 8;
   std::uint32_t samples = 4096;
   float reduction = 0;
-  std::uint64_t seed = 1;
   std::uint32_t revision = 1;
   bool operator==(const FitSettings&) const = default;
 };
@@ -43,14 +42,16 @@ struct LobeCacheInfo {
 /// An open cache: the mapped file, checked, with its records in place. Immutable; move-only.
 class LobeCache {
  public:
-  /// Maps, verifies the structure, then the meaning: a record per grid entry, indices in range, weights that sum to one,
-  /// positive definite covariances, finite numbers. Throws std::runtime_error that names the file and the fault.
+  /// Maps, verifies the structure, then the meaning: a record per grid entry, indices in range, weights that sum to
+  /// one, positive definite covariances, finite numbers. Throws std::runtime_error that names the file and the fault.
   static LobeCache open(const std::filesystem::path& path);
 
   const LobeCacheInfo& info() const { return info_; }
   std::span<const CacheRecord> records() const { return records_; }
   std::span<const CacheComponent> components() const { return components_; }
-  std::span<const CacheComponent> components(const CacheRecord& r) const { return components_.subspan(r.first, r.count); }
+  std::span<const CacheComponent> components(const CacheRecord& r) const {
+    return components_.subspan(r.first, r.count);
+  }
   std::uint64_t hash() const { return hash_; }  ///< of the whole content, from the header
   std::size_t bytes() const { return file_.bytes().size(); }
 
@@ -66,8 +67,8 @@ class LobeCache {
 /// Largest number of components of a record that a cache may hold.
 inline constexpr std::uint32_t kMaxCacheComponents = 32;
 
-/// The file name for a lobe: "MODEL-HASH.lobe", from the key only, so that renderer and fitter find the same file whatever
-/// the settings of the fit.
+/// The file name for a lobe: "MODEL-HASH.lobe", from the key only, so that renderer and fitter find the same file
+/// whatever the settings of the fit.
 std::string lobeFileName(const std::string& model, const std::string& key);
 
 /// The bytes of a cache file; the same input gives the same bytes.

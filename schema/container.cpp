@@ -1,0 +1,149 @@
+#include "schema/container.h"
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cstddef>
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+#include <fmt/format.h>
+#include <xxhash.h>
+
+namespace lobe {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "cache files are read in place and are little-endian");
+
+struct Header {
+  char magic[4];
+  char kind[4];
+  std::uint16_t major, minor;
+  std::uint32_t reserved;
+  std::uint64_t payloadSize;
+  std::uint64_t hash;
+};
+static_assert(sizeof(Header) == 32);
+constexpr std::size_t kHashedHeaderBytes = offsetof(Header, hash);
+constexpr char kMagic[] = {'L', 'O', 'B', 'E'};
+
+std::uint64_t contentHash(const Header& header, std::span<const std::byte> payload) {
+  const std::uint64_t seed = XXH3_64bits(&header, kHashedHeaderBytes);
+  return XXH3_64bits_withSeed(payload.data(), payload.size(), seed);
+}
+
+[[noreturn]] void refuse(const std::string& name, const std::string& fault) {
+  throw std::runtime_error(name + ": " + fault);
+}
+
+[[noreturn]] void refuseToOpen(const std::filesystem::path& path, const char* fault) {
+  refuse(path.string(), fmt::format("cannot open: {}", fault));
+}
+
+/// Letters only: the bytes may be anything, and the message goes to a terminal.
+std::string printable(const char (&kind)[4]) {
+  std::string text(kind, sizeof(kind));
+  for (char& c : text)
+    if (c < ' ' || c > '~') c = '?';
+  return text;
+}
+
+void checkVersion(const Header& header, const std::string& name) {
+  if (header.major == kFormatMajor) return;
+  const bool newer = header.major > kFormatMajor;
+  refuse(name, fmt::format("format version {}.{} is {} than this program's {}.{}: {}", header.major, header.minor,
+                           newer ? "newer" : "older", kFormatMajor, kFormatMinor,
+                           newer ? "use a newer Lobe" : "make the file again"));
+}
+
+}  // namespace
+
+MappedFile::MappedFile(const std::filesystem::path& path) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (file < 0) refuseToOpen(path, std::strerror(errno));
+  struct stat status {};
+  const char* fault = nullptr;
+  if (::fstat(file, &status) != 0)
+    fault = std::strerror(errno);
+  else if (S_ISDIR(status.st_mode))
+    fault = "is a directory";
+  else if (!S_ISREG(status.st_mode))
+    fault = "not a regular file";
+  else if (status.st_size > 0) {
+    void* data = ::mmap(nullptr, static_cast<std::size_t>(status.st_size), PROT_READ, MAP_PRIVATE, file, 0);
+    if (data == MAP_FAILED) {
+      fault = std::strerror(errno);
+    } else {
+      data_ = static_cast<const std::byte*>(data);
+      size_ = static_cast<std::size_t>(status.st_size);
+    }
+  }
+  ::close(file);
+  if (fault) refuseToOpen(path, fault);
+}
+
+MappedFile::MappedFile(MappedFile&& other) noexcept
+    : data_(std::exchange(other.data_, nullptr)), size_(std::exchange(other.size_, 0)) {}
+
+MappedFile& MappedFile::operator=(MappedFile&& other) noexcept {
+  std::swap(data_, other.data_);
+  std::swap(size_, other.size_);
+  return *this;
+}
+
+MappedFile::~MappedFile() {
+  if (data_) ::munmap(const_cast<std::byte*>(data_), size_);
+}
+
+std::vector<std::byte> wrapPayload(const std::string& kind, std::span<const std::byte> payload) {
+  Header header{};
+  if (kind.size() != sizeof(header.kind)) throw std::logic_error("the kind of a container has four letters");
+  std::memcpy(header.magic, kMagic, sizeof(kMagic));
+  std::memcpy(header.kind, kind.data(), sizeof(header.kind));
+  header.major = kFormatMajor;
+  header.minor = kFormatMinor;
+  header.payloadSize = payload.size();
+  header.hash = contentHash(header, payload);
+  std::vector<std::byte> bytes(sizeof(header) + payload.size());
+  std::memcpy(bytes.data(), &header, sizeof(header));
+  std::ranges::copy(payload, bytes.begin() + sizeof(header));
+  return bytes;
+}
+
+std::span<const std::byte> unwrapPayload(const std::string& kind, std::span<const std::byte> bytes,
+                                         const std::string& name) {
+  if (bytes.empty()) refuse(name, "the file is empty");
+  const std::size_t magicBytes = std::min(bytes.size(), sizeof(kMagic));
+  if (std::memcmp(bytes.data(), kMagic, magicBytes) != 0) refuse(name, "not a Lobe file");
+  Header header;
+  if (bytes.size() < sizeof(header))
+    refuse(name, fmt::format("truncated: {} bytes, the header alone has {}", bytes.size(), sizeof(header)));
+  std::memcpy(&header, bytes.data(), sizeof(header));
+  if (std::memcmp(header.kind, kind.data(), sizeof(header.kind)) != 0)
+    refuse(name, fmt::format("a Lobe file of kind '{}', expected '{}'", printable(header.kind), kind));
+  checkVersion(header, name);
+  const std::span<const std::byte> payload = bytes.subspan(sizeof(header));
+  if (header.payloadSize != payload.size())
+    refuse(name, fmt::format("{}: {} bytes, expected {}", payload.size() < header.payloadSize ? "truncated" : "damaged",
+                             bytes.size(), header.payloadSize + sizeof(header)));
+  if (header.hash != contentHash(header, payload)) refuse(name, "damaged: the content does not match its hash");
+  return payload;
+}
+
+std::uint64_t containerHash(std::span<const std::byte> bytes) {
+  Header header;
+  std::memcpy(&header, bytes.data(), sizeof(header));
+  return header.hash;
+}
+
+std::uint64_t hashText(const std::string& text) {
+  return XXH3_64bits(text.data(), text.size());
+}
+
+}  // namespace lobe

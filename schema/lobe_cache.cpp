@@ -1,0 +1,138 @@
+#include "schema/lobe_cache.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "lobe_generated.h"
+
+namespace lobe {
+namespace {
+
+const std::string kKind = "BRDF";
+
+// The structs of the schema have private fields, so sizes and alignments are compared here, and the order of the fields
+// by a test that writes with one and reads with the other.
+static_assert(sizeof(CacheComponent) == sizeof(fb::Component) && alignof(CacheComponent) == alignof(fb::Component));
+static_assert(sizeof(CacheRecord) == sizeof(fb::Record) && alignof(CacheRecord) == alignof(fb::Record));
+static_assert(std::is_trivially_copyable_v<CacheComponent> && std::is_standard_layout_v<CacheComponent>);
+static_assert(std::is_trivially_copyable_v<CacheRecord> && std::is_standard_layout_v<CacheRecord>);
+
+constexpr std::uint8_t kLastGridKind = 1;
+constexpr double kWeightTolerance = 1e-4;
+// Single precision loses the determinant of anything flatter.
+constexpr double kMinRelativeDeterminant = 1e-7;
+
+[[noreturn]] void refuse(const std::string& name, const std::string& fault) {
+  throw std::runtime_error(fmt::format("{}: damaged: {}", name, fault));
+}
+
+bool finite(std::initializer_list<float> values) {
+  for (float v : values)
+    if (!std::isfinite(v)) return false;
+  return true;
+}
+
+void checkComponent(const CacheComponent& c, std::size_t index, const std::string& name) {
+  if (!finite({c.weight, c.meanX, c.meanY, c.covXX, c.covXY, c.covYY}))
+    refuse(name, fmt::format("component {} is not finite", index));
+  if (c.weight < 0) refuse(name, fmt::format("component {} has the negative weight {}", index, c.weight));
+  const double diagonal = static_cast<double>(c.covXX) * c.covYY;
+  const double determinant = diagonal - static_cast<double>(c.covXY) * c.covXY;
+  if (!(c.covXX > 0 && c.covYY > 0 && determinant > kMinRelativeDeterminant * diagonal))
+    refuse(name, fmt::format("the covariance of component {} is not positive definite", index));
+}
+
+void checkRecord(const CacheRecord& r, std::size_t index, std::span<const CacheComponent> components,
+                 const std::string& name) {
+  const auto require = [&](bool condition, const char* fault) {
+    if (!condition) refuse(name, fmt::format("record {}: {}", index, fault));
+  };
+  require(finite({r.integral, r.albedo, r.cosineMass, r.outside, r.nev, r.nevCoverage}), "a number is not finite");
+  require(r.integral >= 0 && r.albedo >= 0 && r.nev >= 0 && r.nevCoverage >= 0, "a negative quantity");
+  require(r.cosineMass > 0 && r.cosineMass <= 1.0001f, "cosine mass out of range");
+  require(r.outside >= 0 && r.outside <= 1, "share outside the disc out of range");
+  require(r.count >= 1 && r.count <= kMaxCacheComponents, "number of components out of range");
+  require(r.first <= components.size() && r.count <= components.size() - r.first, "components out of range");
+  double sum = 0;
+  for (const CacheComponent& c : components.subspan(r.first, r.count)) sum += c.weight;
+  require(std::abs(sum - 1) <= kWeightTolerance, "the weights do not sum to one");
+}
+
+const fb::LobeCache& verified(std::span<const std::byte> payload, const std::string& name) {
+  if (payload.size() >= FLATBUFFERS_MAX_BUFFER_SIZE) refuse(name, "too large");
+  if (reinterpret_cast<std::uintptr_t>(payload.data()) % 8 != 0) refuse(name, "not aligned to 8 bytes");
+  const auto* data = reinterpret_cast<const std::uint8_t*>(payload.data());
+  flatbuffers::Verifier verifier(data, payload.size());
+  if (!fb::VerifyLobeCacheBuffer(verifier)) refuse(name, "the structure is not that of a lobe cache");
+  return *fb::GetLobeCache(data);
+}
+
+LobeCacheInfo readInfo(const fb::LobeCache& cache) {
+  const fb::FitSettings& s = *cache.settings();
+  LobeCacheInfo info;
+  info.toolVersion = cache.tool_version()->str();
+  info.model = cache.model()->str();
+  info.key = cache.key()->str();
+  info.summary = cache.summary()->str();
+  info.modelRevision = cache.model_revision();
+  info.settings = {s.method() ? s.method()->str() : "", s.components(), s.samples(), s.reduction(), s.revision()};
+  info.gridKind = cache.grid_kind();
+  info.gridCount = cache.grid_count();
+  return info;
+}
+
+/// The elements of a vector of structs where they lie.
+template <class To, class From>
+std::span<const To> inPlace(const flatbuffers::Vector<const From*>& vector) {
+  static_assert(sizeof(To) == sizeof(From));
+  return {reinterpret_cast<const To*>(vector.Data()), vector.size()};
+}
+
+}  // namespace
+
+LobeCache::LobeCache(MappedFile file, const std::filesystem::path& path) : file_(std::move(file)) {
+  const std::string name = path.string();
+  const std::span<const std::byte> payload = unwrapPayload(kKind, file_.bytes(), name);
+  hash_ = containerHash(file_.bytes());
+  const fb::LobeCache& cache = verified(payload, name);
+  info_ = readInfo(cache);
+  records_ = inPlace<CacheRecord>(*cache.records());
+  components_ = inPlace<CacheComponent>(*cache.components());
+  if (info_.gridKind > kLastGridKind) refuse(name, fmt::format("grid of unknown kind {}", info_.gridKind));
+  if (info_.gridCount < 1 || info_.gridCount != records_.size())
+    refuse(name, fmt::format("{} records for a grid of {} directions", records_.size(), info_.gridCount));
+  for (std::size_t i = 0; i < components_.size(); ++i) checkComponent(components_[i], i, name);
+  for (std::size_t i = 0; i < records_.size(); ++i) checkRecord(records_[i], i, components_, name);
+}
+
+LobeCache LobeCache::open(const std::filesystem::path& path) {
+  return LobeCache(MappedFile(path), path);
+}
+
+std::string lobeFileName(const std::string& model, const std::string& key) {
+  return fmt::format("{}-{:016x}.lobe", model, hashText(key));
+}
+
+std::vector<std::byte> encodeLobeCache(const LobeCacheInfo& info, std::span<const CacheRecord> records,
+                                       std::span<const CacheComponent> components) {
+  flatbuffers::FlatBufferBuilder builder(1024 + records.size_bytes() + components.size_bytes());
+  const FitSettings& s = info.settings;
+  const auto settings =
+      fb::CreateFitSettings(builder, builder.CreateString(s.method), s.components, s.samples, s.reduction, s.revision);
+  // One after the other: the order in which arguments of a call are evaluated is the compiler's choice.
+  const auto toolVersion = builder.CreateString(info.toolVersion);
+  const auto model = builder.CreateString(info.model);
+  const auto key = builder.CreateString(info.key);
+  const auto summary = builder.CreateString(info.summary);
+  const auto recordVector =
+      builder.CreateVectorOfStructs(reinterpret_cast<const fb::Record*>(records.data()), records.size());
+  const auto componentVector =
+      builder.CreateVectorOfStructs(reinterpret_cast<const fb::Component*>(components.data()), components.size());
+  builder.Finish(fb::CreateLobeCache(builder, toolVersion, model, key, info.modelRevision, summary, settings,
+                                     info.gridKind, info.gridCount, recordVector, componentVector));
+  return wrapPayload(kKind, std::as_bytes(std::span(builder.GetBufferPointer(), builder.GetSize())));
+}
+
+}  // namespace lobe
