@@ -1,6 +1,6 @@
 #pragma once
-// Trained illumination: records of L cosθ over the hemisphere of points in the scene, and the look-up of the record that
-// serves a point (Vorba et al. 2014, Section 5). Frozen: read by any number of threads without locks.
+// Trained illumination: records of L cosθ over the hemisphere of points in the scene, and the look-up of the record
+// that serves a point (Vorba et al. 2014, Section 5). Frozen: read by any number of threads without locks.
 
 #include <array>
 #include <cstdint>
@@ -15,9 +15,9 @@ namespace lobe {
 /// u · 2cosθ/π + (1−u) · Σ π_k N_k over the disc of the frame (tangent, normal × tangent, normal).
 struct IlluminationRecord {
   Vec3 position;
-  Vec3 normal;   ///< unit
-  Vec3 tangent;  ///< unit, orthogonal to normal
-  float radius;  ///< world units, the record serves points within
+  Vec3 normal;       ///< unit
+  Vec3 tangent;      ///< unit, orthogonal to normal
+  float radius;      ///< world units, the record serves points within
   float background;  ///< u in [0,1]
   float samples;     ///< particles seen in training
   std::int32_t count = 0;
@@ -32,8 +32,8 @@ class IlluminationCache {
   /// unit: the length that radii are clamped to (see TrainingOptions), > 0.
   IlluminationCache(std::vector<IlluminationRecord> records, float unit);
 
-  /// The valid record of least |x−x_j|/unit + 2 sqrt(1.001 − n·n_j): within its radius and about 41° of its normal. n is
-  /// the unit geometric normal on the side asked for. nullptr: none, the BSDF is to be sampled.
+  /// The valid record of least |x−x_j|/unit + 2 sqrt(1.001 − n·n_j): within its radius and about 41° of its normal. n
+  /// is the unit geometric normal on the side asked for. nullptr: none, the BSDF is to be sampled.
   const IlluminationRecord* find(const Vec3& x, const Vec3& n) const;
 
   std::span<const IlluminationRecord> records() const { return records_; }

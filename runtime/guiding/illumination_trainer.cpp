@@ -7,9 +7,9 @@
 #include <string>
 #include <unordered_map>
 
-#include <nanoflann.hpp>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <nanoflann.hpp>
 
 namespace lobe {
 namespace {

@@ -1,0 +1,228 @@
+// Records, their look-up, training, and the three-strategy density.
+
+#include <catch2/catch.hpp>
+
+#include <numbers>
+
+#include "runtime/guiding/guided_density.h"
+#include "runtime/guiding/illumination_trainer.h"
+#include "runtime/mixture/random.h"
+
+using namespace lobe;
+
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+
+Vec3 randomDirection(Rng& rng) {
+  const Eigen::Vector2f u = rng.uniform2();
+  const float z = 1 - 2 * u.x();
+  const float r = std::sqrt(std::max(0.0f, 1 - z * z));
+  return {r * std::cos(2 * kPi * u.y()), r * std::sin(2 * kPi * u.y()), z};
+}
+
+Vec3 randomPoint(Rng& rng) {
+  return {rng.uniform(), rng.uniform(), rng.uniform()};
+}
+
+IlluminationRecord recordAt(const Vec3& x, const Vec3& n, float radius) {
+  IlluminationRecord r{};
+  r.position = x;
+  r.normal = n;
+  r.tangent = n.unitOrthogonal();
+  r.radius = radius;
+  r.background = 0.3f;
+  r.samples = 1000;
+  r.count = 2;
+  r.components[0] = {0.6f, 0.3f, 0.2f, {0.01f, 0.004f, 0.02f}};
+  r.components[1] = {0.4f, -0.5f, 0.1f, {0.03f, 0.0f, 0.005f}};
+  return r;
+}
+
+/// The rule of IlluminationCache::find, spelt out over all records.
+const IlluminationRecord* bruteForce(const IlluminationCache& cache, const Vec3& x, const Vec3& n, float unit) {
+  const IlluminationRecord* best = nullptr;
+  float bestCost = 1e30f;
+  for (const IlluminationRecord& r : cache.records()) {
+    const float distance = (x - r.position).norm();
+    if (distance > r.radius || n.dot(r.normal) < 0.75f) continue;
+    const float cost = distance / unit + 2 * std::sqrt(std::max(0.0f, 1.001f - n.dot(r.normal)));
+    if (cost < bestCost) {
+      bestCost = cost;
+      best = &r;
+    }
+  }
+  return best;
+}
+
+/// Particles on the plane z = 0 that see a spot of light around `towards` and a share of uniform light.
+std::vector<Particle> planeParticles(int count, const Vec3& towards, float background, std::uint64_t seed) {
+  std::vector<Particle> particles;
+  Rng rng(seed);
+  for (int i = 0; i < count; ++i) {
+    Vec3 d;
+    if (rng.uniform() < background) {
+      const float r2 = rng.uniform();
+      const float phi = 2 * kPi * rng.uniform();
+      d = {std::sqrt(r2) * std::cos(phi), std::sqrt(r2) * std::sin(phi), std::sqrt(1 - r2)};
+    } else {
+      d = (towards + 0.05f * randomDirection(rng)).normalized();
+    }
+    particles.push_back({{rng.uniform(), rng.uniform(), 0}, Vec3::UnitZ(), d, 1.0f, 10.0f});
+  }
+  return particles;
+}
+
+std::vector<RecordRequest> planeRequests(int count) {
+  std::vector<RecordRequest> requests;
+  Rng rng(99);
+  for (int i = 0; i < count; ++i) requests.push_back({{rng.uniform(), rng.uniform(), 0}, Vec3::UnitZ()});
+  return requests;
+}
+
+}  // namespace
+
+TEST_CASE("guiding: the look-up finds the best valid record") {
+  Rng rng(7);
+  const float unit = 0.1f;
+  std::vector<IlluminationRecord> records;
+  for (int i = 0; i < 2000; ++i)
+    records.push_back(recordAt(randomPoint(rng), randomDirection(rng), unit * (0.1f + 0.9f * rng.uniform())));
+  const IlluminationCache cache(records, unit);
+  int found = 0;
+  for (int i = 0; i < 5000; ++i) {
+    const Vec3 x = randomPoint(rng) * 1.2f - Vec3::Constant(0.1f);
+    const Vec3 n = randomDirection(rng);
+    const IlluminationRecord* expected = bruteForce(cache, x, n, unit);
+    REQUIRE(cache.find(x, n) == expected);
+    found += expected != nullptr;
+  }
+  CHECK(found > 500);
+  CHECK(IlluminationCache().find({0, 0, 0}, Vec3::UnitZ()) == nullptr);
+}
+
+TEST_CASE("guiding: the look-up works far from the origin") {
+  const IlluminationCache cache({recordAt({1e5f, -1e5f, 3e4f}, Vec3::UnitZ(), 50)}, 100);
+  CHECK(cache.find({1e5f + 20, -1e5f, 3e4f}, Vec3::UnitZ()) != nullptr);
+  CHECK(cache.find({1e5f + 60, -1e5f, 3e4f}, Vec3::UnitZ()) == nullptr);
+  CHECK(cache.find({1e5f + 20, -1e5f, 3e4f}, -Vec3::UnitZ()) == nullptr);
+}
+
+TEST_CASE("guiding: training finds the light and the background") {
+  const Vec3 towards = Vec3(0.6f, 0.0f, 0.8f);
+  IlluminationTrainer trainer({}, 20.0f);
+  for (int pass = 0; pass < 6; ++pass)
+    trainer.learn(planeParticles(20000, towards, 0.3f, 100 + pass), planeRequests(500));
+  REQUIRE(!trainer.cache().records().empty());
+  CHECK(trainer.undersampledShare() == 0);
+  const IlluminationRecord* record = trainer.cache().find({0.5f, 0.5f, 0}, Vec3::UnitZ());
+  REQUIRE(record);
+  CHECK(record->background == Approx(0.3f).margin(0.1f));
+  Vec2 mean = Vec2::Zero();
+  for (const Gaussian& g : record->gaussians()) mean += g.weight * g.mean();
+  const Vec3 bitangent = record->normal.cross(record->tangent);
+  const Vec2 expected = toDisc({towards.dot(record->tangent), towards.dot(bitangent), towards.z()});
+  CHECK((mean - expected).norm() < 0.05f);
+}
+
+TEST_CASE("guiding: training places no record where no particle is, and none twice") {
+  IlluminationTrainer trainer({}, 20.0f);
+  trainer.learn({}, planeRequests(10));
+  CHECK(trainer.cache().records().empty());
+  const auto particles = planeParticles(5000, Vec3::UnitZ(), 0.5f, 3);
+  const std::vector<RecordRequest> elsewhere{{{5, 5, 0}, Vec3::UnitZ()}, {{0.5f, 0.5f, 0}, -Vec3::UnitZ()}};
+  trainer.learn(particles, elsewhere);
+  CHECK(trainer.cache().records().empty());
+  const std::vector<RecordRequest> same(5, RecordRequest{{0.5f, 0.5f, 0}, Vec3::UnitZ()});
+  trainer.learn(particles, same);
+  CHECK(trainer.cache().records().size() == 1);
+}
+
+TEST_CASE("guiding: bad training options are refused by name") {
+  TrainingOptions options;
+  options.components = 9;
+  CHECK_THROWS_WITH(options.validate(), Catch::Contains("components"));
+  options = {};
+  options.unitShare = 0;
+  CHECK_THROWS_WITH(options.validate(), Catch::Contains("unit-share"));
+}
+
+namespace {
+
+Reflectance someReflectance() {
+  Reflectance r;
+  r.constant = 0.05f;
+  r.backgroundMass = 0.4f;
+  r.count = 2;
+  r.components[0] = {0.3f, 0.25f, 0.15f, {0.02f, 0.0f, 0.01f}};
+  r.components[1] = {0.1f, 0.7f, 0.6f, {0.05f, 0.01f, 0.05f}};  // partly outside the disc
+  return r;
+}
+
+/// Largest deviation, in standard deviations, of histogram counts over the disc from what the density says.
+double largestDeviation(const GuidedDensity& density, double mutant) {
+  constexpr int bins = 12, samples = 400000, fine = 24;
+  std::vector<double> counts(bins * bins), expected(bins * bins);
+  Rng rng(11);
+  for (int i = 0; i < samples; ++i) {
+    float choice = rng.uniform();
+    const Strategy strategy = density.choose(choice);
+    if (strategy == Strategy::bsdf) continue;
+    const auto wi = density.sample(strategy, choice, rng.uniform2());
+    if (!wi) continue;
+    const Vec2 y = toDisc(*wi);
+    const int bx = std::min(bins - 1, static_cast<int>((y.x() + 1) / 2 * bins));
+    const int by = std::min(bins - 1, static_cast<int>((y.y() + 1) / 2 * bins));
+    ++counts[by * bins + bx];
+  }
+  const double step = 2.0 / (bins * fine);
+  for (int j = 0; j < bins * fine; ++j)
+    for (int i = 0; i < bins * fine; ++i) {
+      const Vec2 y(static_cast<float>(-1 + (i + 0.5) * step), static_cast<float>(-1 + (j + 0.5) * step));
+      if (insideDisc(y))
+        expected[j / fine * bins + i / fine] += mutant * 2 * density.guidedPdf(fromDisc(y)) * step * step;
+    }
+  double worst = 0;
+  for (int i = 0; i < bins * bins; ++i) {
+    const double e = expected[i] * samples;
+    if (e > 50) worst = std::max(worst, std::abs(counts[i] - e) / std::sqrt(e));
+  }
+  return worst;
+}
+
+}  // namespace
+
+TEST_CASE("guiding: what is sampled has the density that is said") {
+  const Reflectance reflectance = someReflectance();
+  const IlluminationRecord record = recordAt(Vec3::Zero(), Vec3::UnitZ(), 1);
+  for (const StrategyShares& shares : {kProductShares, kUncertainProductShares, kGuidedShares}) {
+    const GuidedDensity density(reflectance, record, shares);
+    CHECK(density.bsdfShare() >= shares.bsdf);
+    CHECK(largestDeviation(density, 1.0) < 5);
+    CHECK(largestDeviation(density, 1.1) > 5);  // a density that is wrong by a tenth is seen
+  }
+}
+
+TEST_CASE("guiding: without a product its share goes to the BSDF") {
+  Reflectance far = someReflectance();
+  far.constant = 0;
+  far.count = 1;
+  far.components[0] = {1.0f, 50.0f, 50.0f, {1e-6f, 0, 1e-6f}};
+  const IlluminationRecord record = recordAt(Vec3::Zero(), Vec3::UnitZ(), 1);
+  const GuidedDensity density(far, record, kProductShares);
+  CHECK(density.bsdfShare() == Approx(0.95f));
+  CHECK(std::isfinite(density.guidedPdf({0.6f, 0, 0.8f})));
+  CHECK(density.guidedPdf({0.6f, 0, -0.8f}) == 0);
+}
+
+TEST_CASE("guiding: a diffuse point takes the illumination mixture as it is") {
+  Reflectance diffuse;
+  diffuse.constant = 0.5f / kPi;
+  diffuse.backgroundMass = diffuse.constant;
+  const IlluminationRecord record = recordAt(Vec3::Zero(), Vec3::UnitZ(), 1);
+  const GuidedDensity density(diffuse, record, {0.9f, 0.1f, 0.0f});
+  // Background 0.3 of the product is the BSDF's own sampling: 0.1 + 0.9·0.3.
+  CHECK(density.bsdfShare() == Approx(0.37f));
+  const Vec3 wi = Vec3(0.3f, 0.1f, 0.9f).normalized();
+  CHECK(density.guidedPdf(wi) == Approx(0.9f * 0.7f * mixturePdf(record.gaussians(), toDisc(wi)) / 2));
+}
