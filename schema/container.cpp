@@ -136,10 +136,10 @@ std::span<const std::byte> unwrapPayload(const std::string& kind, std::span<cons
   return payload;
 }
 
-std::uint64_t containerHash(std::span<const std::byte> bytes) {
+ContainerHeader containerHeader(std::span<const std::byte> bytes) {
   Header header;
   std::memcpy(&header, bytes.data(), sizeof(header));
-  return header.hash;
+  return {header.major, header.minor, header.hash};
 }
 
 std::uint64_t hashText(const std::string& text) {

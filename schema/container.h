@@ -43,8 +43,14 @@ std::vector<std::byte> wrapPayload(const std::string& kind, std::span<const std:
 std::span<const std::byte> unwrapPayload(const std::string& kind, std::span<const std::byte> bytes,
                                          const std::string& name);
 
-/// The hash in the header of bytes that unwrapPayload has accepted: of all the file says.
-std::uint64_t containerHash(std::span<const std::byte> bytes);
+/// What the header says.
+struct ContainerHeader {
+  std::uint16_t major, minor;
+  std::uint64_t hash;  ///< of the whole content
+};
+
+/// Of bytes that unwrapPayload has accepted.
+ContainerHeader containerHeader(std::span<const std::byte> bytes);
 
 /// XXH3-64 of text.
 std::uint64_t hashText(const std::string& text);

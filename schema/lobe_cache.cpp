@@ -95,7 +95,7 @@ std::span<const To> inPlace(const flatbuffers::Vector<const From*>& vector) {
 LobeCache::LobeCache(MappedFile file, const std::filesystem::path& path) : file_(std::move(file)) {
   const std::string name = path.string();
   const std::span<const std::byte> payload = unwrapPayload(kKind, file_.bytes(), name);
-  hash_ = containerHash(file_.bytes());
+  header_ = containerHeader(file_.bytes());
   const fb::LobeCache& cache = verified(payload, name);
   info_ = readInfo(cache);
   records_ = inPlace<CacheRecord>(*cache.records());

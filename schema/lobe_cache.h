@@ -52,7 +52,9 @@ class LobeCache {
   std::span<const CacheComponent> components(const CacheRecord& r) const {
     return components_.subspan(r.first, r.count);
   }
-  std::uint64_t hash() const { return hash_; }  ///< of the whole content, from the header
+  std::uint64_t hash() const { return header_.hash; }  ///< of the whole content
+  /// The file's format version.
+  const ContainerHeader& header() const { return header_; }
   std::size_t bytes() const { return file_.bytes().size(); }
 
  private:
@@ -61,7 +63,7 @@ class LobeCache {
   LobeCacheInfo info_;
   std::span<const CacheRecord> records_;
   std::span<const CacheComponent> components_;
-  std::uint64_t hash_ = 0;
+  ContainerHeader header_{};
 };
 
 /// Largest number of components of a record that a cache may hold.

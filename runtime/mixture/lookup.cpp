@@ -1,0 +1,47 @@
+#include "runtime/mixture/lookup.h"
+
+#include <algorithm>
+
+namespace lobe {
+namespace {
+
+/// The unit vector of wo's azimuth; any where there is none.
+Vec2 azimuthOf(const Vec3& wo) {
+  const float length = wo.head<2>().norm();
+  return length > 0 ? Vec2(wo.head<2>() / length) : Vec2::UnitX();
+}
+
+/// The largest t ≤ 1 with |mean + t·step| ≤ 1 for a mean in the disc; 1 for others.
+float largestStep(const Vec2& mean, const Vec2& step) {
+  const float room = 1.0f - mean.squaredNorm();
+  const float length2 = step.squaredNorm();
+  if (room <= 0 || !(length2 > 0)) return 1.0f;
+  const float along = mean.dot(step);
+  const float t = (std::sqrt(along * along + length2 * room) - along) / length2;
+  return std::clamp(t, 0.0f, 1.0f);
+}
+
+}  // namespace
+
+std::span<Gaussian> alignMixture(const DirectionGrid& grid, int entry, std::span<const Gaussian> components,
+                                 const Vec3& wo, std::span<Gaussian> out) {
+  out = out.first(components.size());
+  Vec2 reference = toDisc(grid.direction(entry));
+  if (grid.kind == GridKind::elevation) {
+    const Vec2 azimuth = azimuthOf(wo);
+    reference = azimuth * reference.x();  // entries lie on the positive x axis
+    for (std::size_t k = 0; k < out.size(); ++k) out[k] = rotated(components[k], azimuth);
+  } else {
+    std::ranges::copy(components, out.begin());
+  }
+  const Vec2 step = reference - toDisc(wo);
+  float t = 1.0f;
+  for (const Gaussian& g : out) t = std::min(t, largestStep(g.mean(), step));
+  for (Gaussian& g : out) {
+    g.meanX += t * step.x();
+    g.meanY += t * step.y();
+  }
+  return out;
+}
+
+}  // namespace lobe
