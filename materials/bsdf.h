@@ -2,7 +2,8 @@
 // The interface of every reflectance model. See lobe.h for frame and names of directions.
 //
 // A BSDF has a smooth part (eval, sample, pdf) and a delta part (sampleDelta). deltaProbability(wo) says how often its
-// own sampler takes the delta part, so that a guided sampler can replace the smooth half and leave the delta half alone:
+// own sampler takes the delta part, so that a guided sampler can replace the smooth half and leave the delta half
+// alone:
 //   with probability P = deltaProbability: sampleDelta, its weight to be divided by P;
 //   else: sample, its pdf to be multiplied by 1 − P.
 // All functions are const and safe to call from any thread.
@@ -76,12 +77,15 @@ class Bsdf {
   /// The lobes of the smooth part that are to be fitted; empty for diffuse and for pure delta materials.
   virtual std::span<const LobePtr> lobes() const { return {}; }
 
-  /// The smooth reflection at wo as a mixture of lobes(), for the side that wo is on: the lobes see wo with z > 0 and give
-  /// wi on the same side. Zero where nothing is reflected.
+  /// The smooth reflection at wo as a mixture of lobes(), for the side that wo is on: the lobes see wo with z > 0 and
+  /// give wi on the same side. Zero where nothing is reflected.
   virtual LobeMixture mixture(const Vec3& wo, const Vec2& uv) const = 0;
 
   /// The directional albedo of everything, approximately: for demodulation and termination, not for estimates.
   virtual Rgb albedo(const Vec3& wo, const Vec2& uv) const = 0;
+
+  /// Whether light may pass to the other side of the surface.
+  virtual bool transmits() const { return false; }
 
   /// The local shading normal after bump or normal mapping, given the derivatives of position by u and v in the local
   /// frame; UnitZ for all but the mapping models.

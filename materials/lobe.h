@@ -41,7 +41,8 @@ class Lobe {
   /// Raised when the code of the model changes what eval returns; a cache of another revision is stale.
   virtual int revision() const = 0;
 
-  /// ρ(wo, wi) without the cosine, luminance for lobes with spectral parameters; 0 where either is not above the surface.
+  /// ρ(wo, wi) without the cosine, luminance for lobes with spectral parameters; 0 where either is not above the
+  /// surface.
   virtual double eval(const Vec3& wo, const Vec3& wi) const = 0;
 
   /// Draws wi for wo.z > 0 from u uniform in [0,1)². nullopt: the sample has value zero (below the surface, say), and

@@ -35,14 +35,19 @@ class Parameters {
   void addChild(BsdfPtr bsdf) { children_.push_back(std::move(bsdf)); }
 
   bool has(std::string_view name) const;
+  /// Whether the parameter is there and is text, for what may be given by name or by number.
+  bool holdsText(std::string_view name) const;
 
   // Each returns the fallback when there is no such parameter and throws ParameterError when it has another type.
   bool flag(std::string_view name, bool fallback) const;
   double number(std::string_view name, double fallback) const;
   std::string text(std::string_view name, std::string fallback) const;
-  Rgb colour(std::string_view name, const Rgb& fallback) const;               ///< from rgb, or a number as grey
-  TexturePtr texture(std::string_view name, const Rgb& fallback) const;       ///< from texture, rgb or number
-  Eigen::Matrix4d transform(std::string_view name) const;                     ///< identity when missing
+  Rgb colour(std::string_view name, const Rgb& fallback) const;          ///< from rgb, or a number as grey
+  TexturePtr texture(std::string_view name, const Rgb& fallback) const;  ///< from texture, rgb or number
+  Eigen::Matrix4d transform(std::string_view name) const;                ///< identity when missing
+  /// The only texture among the parameters, whatever its name (a nested texture may have none); ParameterError when
+  /// there are none or several.
+  TexturePtr onlyTexture() const;
 
   const std::vector<BsdfPtr>& children() const { return children_; }
   /// The only nested BSDF; ParameterError when there are none or several.

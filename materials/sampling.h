@@ -25,7 +25,9 @@ inline Vec3 squareToCosineHemisphere(const Vec2& u) {
   const Vec2 d = squareToDisk(u);
   return {d.x(), d.y(), std::sqrt(std::max(0.0f, 1.0f - d.squaredNorm()))};
 }
-inline float cosineHemispherePdf(const Vec3& w) { return std::max(0.0f, w.z()) * kInvPi; }
+inline float cosineHemispherePdf(const Vec3& w) {
+  return std::max(0.0f, w.z()) * kInvPi;
+}
 
 /// u uniform in [0,1)² to a direction of density 1/(4π).
 inline Vec3 squareToSphere(const Vec2& u) {

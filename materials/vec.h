@@ -10,7 +10,11 @@ using Vec3 = Eigen::Vector3f;
 /// A linear radiometric triple (Rec. 709 primaries). An array, so that products are by component.
 using Rgb = Eigen::Array3f;
 
-inline float luminance(const Rgb& c) { return 0.212671f * c.x() + 0.715160f * c.y() + 0.072169f * c.z(); }
-inline Rgb grey(float value) { return Rgb::Constant(value); }
+inline float luminance(const Rgb& c) {
+  return 0.212671f * c.x() + 0.715160f * c.y() + 0.072169f * c.z();
+}
+inline Rgb grey(float value) {
+  return Rgb::Constant(value);
+}
 
 }  // namespace lobe

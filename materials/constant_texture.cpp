@@ -1,0 +1,22 @@
+#include "materials/texture.h"
+
+namespace lobe {
+namespace {
+
+class ConstantTexture final : public Texture {
+ public:
+  explicit ConstantTexture(const Rgb& colour) : colour_(colour) {}
+  Rgb eval(const Vec2&) const override { return colour_; }
+  Rgb mean() const override { return colour_; }
+
+ private:
+  Rgb colour_;
+};
+
+}  // namespace
+
+TexturePtr constantTexture(const Rgb& colour) {
+  return std::make_shared<ConstantTexture>(colour);
+}
+
+}  // namespace lobe

@@ -1,0 +1,23 @@
+#pragma once
+// Internal to materials/: the diffuse base under a dielectric coating, as smooth and rough plastic have it.
+
+#include "materials/texture.h"
+
+namespace lobe {
+
+/// Light that crosses the coating scatters diffusely, and is partly thrown back by the coating from within, again and
+/// again. What leaves is colour(uv) · T(cosθo) · T(cosθi) / π, T being the coating's transmittance from outside.
+struct DiffuseBase {
+  TexturePtr reflectance;
+  float internalReflectance;  ///< of the coating, for diffuse light from within
+  float inverseEta2;          ///< (outside index over inside index)²
+  bool nonlinear;             ///< whether the colour saturates by the repeated scattering
+
+  Rgb colour(const Vec2& uv) const {
+    const Rgb diffuse = reflectance->eval(uv);
+    const Rgb repeated = nonlinear ? Rgb(diffuse * internalReflectance) : grey(internalReflectance);
+    return diffuse * inverseEta2 / (1.0f - repeated);
+  }
+};
+
+}  // namespace lobe

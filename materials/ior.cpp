@@ -1,0 +1,117 @@
+#include "materials/ior.h"
+
+#include <algorithm>
+#include <cctype>
+#include <iterator>
+
+#include <fmt/format.h>
+
+namespace lobe {
+namespace {
+
+struct NamedIor {
+  std::string_view name;
+  double value;
+};
+
+// At 589 nm and room temperature (Hecht, Optics), by the names of Mitsuba.
+constexpr NamedIor kDielectrics[] = {
+    {"acetone", 1.36},
+    {"acrylic glass", 1.49},
+    {"air", 1.000277},
+    {"amber", 1.55},
+    {"benzene", 1.501},
+    {"bk7", 1.5046},
+    {"bromine", 1.661},
+    {"carbon dioxide", 1.00045},
+    {"carbon tetrachloride", 1.461},
+    {"diamond", 2.419},
+    {"ethanol", 1.361},
+    {"fused quartz", 1.458},
+    {"glycerol", 1.4729},
+    {"helium", 1.000036},
+    {"hydrogen", 1.000132},
+    {"pet", 1.575},
+    {"polypropylene", 1.49},
+    {"pyrex", 1.47},
+    {"silicone oil", 1.52045},
+    {"sodium chloride", 1.544},
+    {"vacuum", 1.0},
+    {"water", 1.333},
+    {"water ice", 1.31},
+};
+
+struct NamedConductor {
+  std::string_view name;
+  float eta[3];
+  float k[3];
+};
+
+// Measured spectra integrated against the colour matching functions, Rec. 709 primaries, as renderers use them.
+constexpr NamedConductor kConductors[] = {
+    {"none", {0.0f, 0.0f, 0.0f}, {1.0f, 1.0f, 1.0f}},
+    {"a-C", {2.94410f, 2.22715f, 1.96817f}, {0.887433f, 0.799322f, 0.815286f}},
+    {"Ag", {0.155265f, 0.116723f, 0.138381f}, {4.82834f, 3.12225f, 2.14695f}},
+    {"Al", {1.65746f, 0.880369f, 0.521229f}, {9.22387f, 6.26952f, 4.83700f}},
+    {"Au", {0.143119f, 0.374957f, 1.44248f}, {3.98316f, 2.38572f, 1.60322f}},
+    {"Be", {4.18506f, 3.18506f, 2.78409f}, {3.83544f, 3.01013f, 2.86901f}},
+    {"Cr", {4.36968f, 2.91670f, 1.65470f}, {5.20643f, 4.23136f, 3.75495f}},
+    {"Cu", {0.200438f, 0.924033f, 1.10221f}, {3.91295f, 2.45285f, 2.14219f}},
+    {"Hg", {2.39893f, 1.44003f, 0.909551f}, {6.32763f, 4.37194f, 3.42179f}},
+    {"Ir", {3.08641f, 2.08218f, 1.61789f}, {5.59215f, 4.06718f, 3.26726f}},
+    {"K", {0.0640493f, 0.0464101f, 0.0381842f}, {2.10422f, 1.34894f, 0.913211f}},
+    {"Li", {0.265787f, 0.195610f, 0.220920f}, {3.54017f, 2.31113f, 1.66859f}},
+    {"Mo", {4.48370f, 3.52546f, 2.77608f}, {4.11113f, 3.42087f, 3.15060f}},
+    {"Nb", {3.42014f, 2.79019f, 2.39559f}, {3.44138f, 2.73764f, 2.57991f}},
+    {"Ni_palik", {2.36728f, 1.66336f, 1.46706f}, {4.49883f, 3.05016f, 2.34543f}},
+    {"Rh", {2.58580f, 1.86019f, 1.55443f}, {6.78229f, 4.70295f, 3.97609f}},
+    {"Ta", {2.06258f, 2.39309f, 2.62807f}, {2.40805f, 1.74137f, 1.94704f}},
+    {"TiN", {1.64846f, 1.15045f, 1.37978f}, {3.36846f, 1.94349f, 1.10201f}},
+    {"V_palik", {4.27751f, 3.51315f, 2.76113f}, {3.49118f, 2.89036f, 3.11170f}},
+    {"W", {4.37070f, 3.30030f, 2.99827f}, {3.50068f, 2.60487f, 2.27319f}},
+};
+
+std::string lower(std::string_view text) {
+  std::string result;
+  std::transform(text.begin(), text.end(), std::back_inserter(result),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return result;
+}
+
+/// The entry of a table by name in any case; ParameterError lists the table.
+template <typename Table>
+const auto& lookUp(const Table& table, std::string_view parameter, const std::string& wanted) {
+  std::string known;
+  for (const auto& entry : table) {
+    if (lower(entry.name) == lower(wanted)) return entry;
+    known += fmt::format("{}{}", known.empty() ? "" : ", ", entry.name);
+  }
+  throw ParameterError(std::string(parameter),
+                       fmt::format("unknown {} \"{}\"; known are a number, or {}", parameter, wanted, known));
+}
+
+}  // namespace
+
+double readIor(const Parameters& parameters, std::string_view name, std::string_view fallback) {
+  if (!parameters.has(name) || parameters.holdsText(name))
+    return lookUp(kDielectrics, name, parameters.text(name, std::string(fallback))).value;
+  const double value = parameters.number(name, 0.0);
+  if (!(value > 0.0)) throw ParameterError(std::string(name), fmt::format("{} must be positive, not {}", name, value));
+  return value;
+}
+
+double readRelativeIor(const Parameters& parameters, std::string_view interiorFallback) {
+  return readIor(parameters, "int_ior", interiorFallback) / readIor(parameters, "ext_ior", "air");
+}
+
+ComplexIor readConductor(const Parameters& parameters) {
+  const NamedConductor& preset = lookUp(kConductors, "material", parameters.text("material", "Cu"));
+  const float outside = static_cast<float>(readIor(parameters, "ext_eta", "air"));
+  const Rgb eta = parameters.colour("eta", Rgb(preset.eta[0], preset.eta[1], preset.eta[2]));
+  const Rgb k = parameters.colour("k", Rgb(preset.k[0], preset.k[1], preset.k[2]));
+  if (!(eta >= 0.0f).all()) throw ParameterError("eta", "eta must not be negative");
+  if (!(k >= 0.0f).all()) throw ParameterError("k", "k must not be negative");
+  return {eta / outside, k / outside};
+}
+
+}  // namespace lobe

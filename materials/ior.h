@@ -1,0 +1,26 @@
+#pragma once
+// Indices of refraction: by number or by the names scene files use.
+
+#include <string_view>
+
+#include "materials/parameters.h"
+
+namespace lobe {
+
+/// The parameter as a number or as a name ("bk7", any case); the fallback is a name. ParameterError: an unknown name or
+/// an index that is not positive.
+double readIor(const Parameters& parameters, std::string_view name, std::string_view fallback);
+
+/// int_ior over ext_ior (default air). ParameterError as above.
+double readRelativeIor(const Parameters& parameters, std::string_view interiorFallback);
+
+struct ComplexIor {
+  Rgb eta;
+  Rgb k;
+};
+
+/// material (default Cu; "none" is a perfect mirror), eta, k and ext_eta (default air), which both are divided by.
+/// ParameterError: an unknown name or an index that is not positive.
+ComplexIor readConductor(const Parameters& parameters);
+
+}  // namespace lobe

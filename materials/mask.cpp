@@ -1,0 +1,87 @@
+// Lets part of the light pass straight through, as if there were holes too small to see.
+
+#include "materials/models.h"
+
+namespace lobe {
+namespace {
+
+class Mask final : public Bsdf {
+ public:
+  Mask(BsdfPtr nested, TexturePtr opacity) : nested_(std::move(nested)), opacity_(std::move(opacity)) {}
+
+  Rgb eval(const Vec3& wo, const Vec3& wi, const Vec2& uv) const override {
+    return nested_->eval(wo, wi, uv) * opacity(uv);
+  }
+
+  std::optional<BsdfSample> sample(const Vec3& wo, const Vec2& uv, float choice, const Vec2& u) const override {
+    std::optional<BsdfSample> result = nested_->sample(wo, uv, choice, u);
+    if (result) result->f *= opacity(uv);
+    return result;
+  }
+
+  float pdf(const Vec3& wo, const Vec3& wi, const Vec2& uv) const override { return nested_->pdf(wo, wi, uv); }
+
+  std::optional<DeltaSample> sampleDelta(const Vec3& wo, const Vec2& uv, float choice) const override {
+    const Rgb a = opacity(uv);
+    const Choice p = choiceAt(a, wo, uv);
+    const float total = p.pass + p.nestedDelta;
+    if (!(total > 0.0f)) return std::nullopt;
+    const float pass = p.pass / total;
+    if (choice < pass) return DeltaSample{-wo, (1.0f - a) / pass, 1.0f};
+    std::optional<DeltaSample> result = nested_->sampleDelta(wo, uv, (choice - pass) / (1.0f - pass));
+    if (result) result->weight *= a / (1.0f - pass);
+    return result;
+  }
+
+  float deltaProbability(const Vec3& wo, const Vec2& uv) const override {
+    const Choice p = choiceAt(opacity(uv), wo, uv);
+    return std::min(1.0f, p.pass + p.nestedDelta);
+  }
+
+  std::span<const LobePtr> lobes() const override { return nested_->lobes(); }
+
+  LobeMixture mixture(const Vec3& wo, const Vec2& uv) const override {
+    LobeMixture result = nested_->mixture(wo, uv);
+    const float scale = luminance(opacity(uv));
+    for (int i = 0; i < result.glossyCount; ++i) result.glossy[static_cast<std::size_t>(i)].tint *= scale;
+    result.constant *= scale;
+    return result;
+  }
+
+  Rgb albedo(const Vec3& wo, const Vec2& uv) const override {
+    const Rgb a = opacity(uv);
+    return nested_->albedo(wo, uv) * a + (1.0f - a);
+  }
+
+  bool transmits() const override { return true; }
+
+  Vec3 perturbedNormal(const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const override {
+    return nested_->perturbedNormal(uv, dpdu, dpdv);
+  }
+
+ private:
+  /// Probabilities of passing through and of the nested model's delta part; the rest is its smooth part.
+  struct Choice {
+    float pass;
+    float nestedDelta;
+  };
+
+  Choice choiceAt(const Rgb& a, const Vec3& wo, const Vec2& uv) const {
+    const float through = luminance(1.0f - a);
+    const float pass = through / (through + luminance(a));
+    return {pass, (1.0f - pass) * nested_->deltaProbability(wo, uv)};
+  }
+
+  Rgb opacity(const Vec2& uv) const { return opacity_->eval(uv).max(0.0f).min(1.0f); }
+
+  BsdfPtr nested_;
+  TexturePtr opacity_;
+};
+
+}  // namespace
+
+BsdfPtr makeMask(const Parameters& parameters) {
+  return std::make_shared<Mask>(parameters.onlyChild(), parameters.texture("opacity", grey(0.5f)));
+}
+
+}  // namespace lobe

@@ -1,0 +1,45 @@
+#include "materials/registry.h"
+
+#include <array>
+
+#include <fmt/format.h>
+
+#include "materials/models.h"
+
+namespace lobe {
+namespace {
+
+struct Entry {
+  std::string_view type;
+  BsdfPtr (*make)(const Parameters&);
+};
+
+// Sorted by name: knownBsdfs promises it.
+constexpr std::array kModels = {
+    Entry{"bumpmap", makeBumpMap},
+    Entry{"conductor", makeConductor},
+    Entry{"dielectric", makeDielectric},
+    Entry{"diffuse", makeDiffuse},
+    Entry{"mask", makeMask},
+    Entry{"plastic", makePlastic},
+    Entry{"roughconductor", makeRoughConductor},
+    Entry{"roughplastic", makeRoughPlastic},
+    Entry{"thindielectric", makeThinDielectric},
+    Entry{"twosided", makeTwoSided},
+};
+
+}  // namespace
+
+BsdfPtr makeBsdf(std::string_view type, const Parameters& parameters) {
+  for (const Entry& entry : kModels)
+    if (entry.type == type) return entry.make(parameters);
+  throw ParameterError("", fmt::format("unknown bsdf type \"{}\"; known are {}", type, fmt::join(knownBsdfs(), ", ")));
+}
+
+std::vector<std::string> knownBsdfs() {
+  std::vector<std::string> names;
+  for (const Entry& entry : kModels) names.emplace_back(entry.type);
+  return names;
+}
+
+}  // namespace lobe
