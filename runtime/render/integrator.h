@@ -1,0 +1,42 @@
+#pragma once
+// What all integrators share: the interface, and what they count.
+
+#include <array>
+#include <cstdint>
+
+#include "runtime/mixture/random.h"
+#include "runtime/render/ray.h"
+
+namespace lobe {
+
+/// What found the next direction of a path.
+enum class SamplingStrategy { bsdf, product, illumination, delta };
+inline constexpr std::array<const char*, 4> kSamplingStrategyNames{"bsdf", "product", "illumination", "delta"};
+
+/// Counted by each thread for itself and summed; sums of integers do not depend on the order.
+struct PathStatistics {
+  std::uint64_t paths = 0;
+  std::uint64_t segments = 0;    ///< rays traced to extend paths
+  std::uint64_t shadowRays = 0;  ///< rays traced towards lights
+  std::array<std::uint64_t, kSamplingStrategyNames.size()> strategies{};
+
+  void count(SamplingStrategy strategy) { ++strategies[static_cast<std::size_t>(strategy)]; }
+  std::uint64_t rays() const { return segments + shadowRays; }
+
+  PathStatistics& operator+=(const PathStatistics& other) {
+    paths += other.paths;
+    segments += other.segments;
+    shadowRays += other.shadowRays;
+    for (std::size_t i = 0; i < strategies.size(); ++i) strategies[i] += other.strategies[i];
+    return *this;
+  }
+};
+
+class Integrator {
+ public:
+  virtual ~Integrator() = default;
+  /// One unbiased estimate of the radiance that arrives along the ray. Called from many threads.
+  virtual Rgb radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const = 0;
+};
+
+}  // namespace lobe

@@ -1,0 +1,191 @@
+#include "runtime/render/lights.h"
+
+#include <cmath>
+
+namespace lobe {
+namespace {
+
+DiscreteDistribution trianglesByArea(const TriangleMesh& mesh) {
+  std::vector<float> areas;
+  areas.reserve(mesh.triangles.size());
+  for (const auto& [i, j, k] : mesh.triangles) {
+    const Vec3& a = mesh.positions[i];
+    areas.push_back(0.5f * (mesh.positions[j] - a).cross(mesh.positions[k] - a).norm());
+  }
+  return DiscreteDistribution(areas);
+}
+
+// The cone that a sphere fills as seen from a point outside: 1 − cosθ without cancellation. nullopt: from inside.
+struct Cone {
+  Vec3 axis;
+  float distance;        // to the centre
+  float sine2;           // of the half angle
+  float oneMinusCosine;  // solid angle over 2π
+};
+std::optional<Cone> coneOf(const Sphere& sphere, const Vec3& point) {
+  const Vec3 toCentre = sphere.centre - point;
+  const float distance = toCentre.norm();
+  const float sine = sphere.radius / distance;
+  if (!(sine < 1.0f)) return std::nullopt;
+  const float sine2 = sine * sine;
+  return Cone{toCentre / distance, distance, sine2, sine2 / (1.0f + std::sqrt(1.0f - sine2))};
+}
+
+float coneDensity(const Cone& cone) {
+  return 0.5f * kInvPi / cone.oneMinusCosine;
+}
+
+// A direction uniform in the cone, and the first point of the sphere that it meets.
+LightSample sampleCone(const Sphere& sphere, const Cone& cone, const Vec2& u) {
+  const float oneMinusCosine = u.x() * cone.oneMinusCosine;
+  const float cosine = 1.0f - oneMinusCosine;
+  const float sine2 = oneMinusCosine * (2.0f - oneMinusCosine);
+  const float azimuth = 2.0f * kPi * u.y();
+  const float sine = std::sqrt(sine2);
+  const Frame frame = Frame::fromNormal(cone.axis);
+  LightSample result;
+  result.wi = frame.toWorld({sine * std::cos(azimuth), sine * std::sin(azimuth), cosine});
+  const float distance = cone.distance;
+  const float half = std::sqrt(std::max(0.0f, sphere.radius * sphere.radius - distance * distance * sine2));
+  result.distance = distance * cosine - half;
+  result.source = pointOnSphere(sphere, (result.distance * result.wi - distance * cone.axis).normalized());
+  result.pdf = coneDensity(cone);
+  return result;
+}
+
+// From density over a surface's area to density over solid angle; 0 from behind.
+float toSolidAngle(float areaDensity, float distance2, float cosine) {
+  return cosine > 0.0f ? areaDensity * distance2 / cosine : 0.0f;
+}
+
+}  // namespace
+
+Lights::Lights(const Scene& scene, const Eigen::AlignedBox3f& bounds)
+    : scene_(scene), lightOfShape_(scene.shapes.size(), -1) {
+  if (!bounds.isEmpty()) {
+    centre_ = bounds.center();
+    radius_ = 0.5f * bounds.diagonal().norm();
+  }
+  std::vector<float> powers;
+  for (std::size_t i = 0; i < scene.shapes.size(); ++i) {
+    const Shape& shape = scene.shapes[i];
+    if (!shape.emitter) continue;
+    AreaLight light{&shape, 0.0f, {}};
+    if (const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry)) {
+      light.triangles = trianglesByArea(*mesh);
+      light.area = static_cast<float>(light.triangles.total());
+    } else if (const auto* sphere = std::get_if<Sphere>(&shape.geometry)) {
+      light.area = 4.0f * kPi * sphere->radius * sphere->radius;
+    } else {
+      const Disk& disk = std::get<Disk>(shape.geometry);
+      light.area = kPi * disk.u.cross(disk.v).norm();
+    }
+    if (!(light.area > 0.0f)) continue;
+    lightOfShape_[i] = static_cast<int>(areas_.size());
+    powers.push_back(std::max(0.0f, kPi * light.area * luminance(shape.emitter->radiance->mean())));
+    areas_.push_back(std::move(light));
+  }
+  if (scene.environment) {
+    environment_.emplace(*scene.environment);
+    powers.push_back(static_cast<float>(environment_->flux() * kPi * radius_ * radius_));
+  }
+  choice_ = DiscreteDistribution(powers);
+}
+
+Lights::PointSample Lights::samplePoint(const AreaLight& light, float choice, const Vec2& u) const {
+  const float density = 1.0f / light.area;
+  if (const auto* mesh = std::get_if<TriangleMesh>(&light.shape->geometry)) {
+    const auto triangle = static_cast<std::uint32_t>(light.triangles.sample(choice));
+    const float root = std::sqrt(u.x());
+    return {pointOnTriangle(*mesh, triangle, root * (1.0f - u.y()), root * u.y()), density};
+  }
+  if (const auto* sphere = std::get_if<Sphere>(&light.shape->geometry))
+    return {pointOnSphere(*sphere, squareToSphere(u)), density};
+  const Vec2 d = squareToDisk(u);
+  return {pointOnDisk(std::get<Disk>(light.shape->geometry), d.x(), d.y()), density};
+}
+
+std::optional<LightSample> Lights::sampleArea(const AreaLight& light, const Vec3& point, float choice,
+                                              const Vec2& u) const {
+  LightSample result;
+  const auto* sphere = std::get_if<Sphere>(&light.shape->geometry);
+  const std::optional<Cone> cone = sphere ? coneOf(*sphere, point) : std::nullopt;
+  if (cone) {
+    if (sphere->flipped) return std::nullopt;  // emits inwards
+    result = sampleCone(*sphere, *cone, u);
+  } else {
+    const PointSample sample = samplePoint(light, choice, u);
+    const Vec3 toLight = sample.point.position - point;
+    const float distance2 = toLight.squaredNorm();
+    result.distance = std::sqrt(distance2);
+    result.wi = toLight / result.distance;
+    result.pdf = toSolidAngle(sample.areaDensity, distance2, -sample.point.normal.dot(result.wi));
+    result.source = sample.point;
+  }
+  if (!(result.pdf > 0.0f) || !std::isfinite(result.pdf)) return std::nullopt;
+  result.radiance = light.shape->emitter->radiance->eval(result.source->uv);
+  return result;
+}
+
+std::optional<LightSample> Lights::sampleEnvironment(const Vec2& u) const {
+  const std::optional<EnvironmentSample> sample = environment_->sample(u);
+  if (!sample) return std::nullopt;
+  return LightSample{sample->wi, kInfinity, sample->radiance, sample->pdf, std::nullopt};
+}
+
+std::optional<LightSample> Lights::sample(const Vec3& point, float choice, const Vec2& u) const {
+  if (empty()) return std::nullopt;
+  const std::size_t light = choice_.sample(choice);
+  std::optional<LightSample> result =
+      light < areas_.size() ? sampleArea(areas_[light], point, choice, u) : sampleEnvironment(u);
+  if (result) result->pdf *= choice_.probability(light);
+  return result;
+}
+
+float Lights::pdf(const Vec3& point, const SurfaceHit& hit) const {
+  const int light = lightOfShape_[hit.shape];
+  if (light < 0 || hit.normal.dot(hit.woWorld) <= 0.0f || empty()) return 0.0f;
+  const AreaLight& area = areas_[light];
+  const float choice = choice_.probability(light);
+  if (const auto* sphere = std::get_if<Sphere>(&area.shape->geometry))
+    if (const std::optional<Cone> cone = coneOf(*sphere, point))
+      return sphere->flipped ? 0.0f : choice * coneDensity(*cone);
+  const float distance2 = (hit.position - point).squaredNorm();
+  return choice * toSolidAngle(1.0f / area.area, distance2, hit.normal.dot(hit.woWorld));
+}
+
+Rgb Lights::environmentRadiance(const Vec3& direction) const {
+  return environment_ ? environment_->radiance(direction) : Rgb(Rgb::Zero());
+}
+
+float Lights::environmentPdf(const Vec3& direction) const {
+  const float choice = environmentProbability();
+  return choice > 0.0f ? choice * environment_->pdf(direction) : 0.0f;
+}
+
+std::optional<EmittedPhoton> Lights::areaPhoton(const AreaLight& light, float choice, const Vec2& u1,
+                                                const Vec2& u2) const {
+  const PointSample sample = samplePoint(light, choice, u1);
+  const Vec3 direction = Frame::fromNormal(sample.point.normal).toWorld(squareToCosineHemisphere(u2));
+  const Rgb power = light.shape->emitter->radiance->eval(sample.point.uv) * (kPi / sample.areaDensity);
+  return EmittedPhoton{spawnRay(sample.point, direction), power, false};
+}
+
+EmittedPhoton Lights::photonFromEnvironment(const EnvironmentSample& from, const Vec2& u) const {
+  const Vec2 d = squareToDisk(u) * radius_;
+  const Vec3 origin = centre_ + Frame::fromNormal(from.wi).toWorld({d.x(), d.y(), radius_});
+  return {{origin, -from.wi}, from.radiance * (kPi * radius_ * radius_ / from.pdf), true};
+}
+
+std::optional<EmittedPhoton> Lights::samplePhoton(float choice, const Vec2& u1, const Vec2& u2) const {
+  const std::size_t light = choice_.sample(choice);
+  std::optional<EmittedPhoton> photon;
+  if (light < areas_.size())
+    photon = areaPhoton(areas_[light], choice, u1, u2);
+  else if (const std::optional<EnvironmentSample> from = environment_->sample(u1))
+    photon = photonFromEnvironment(*from, u2);
+  if (photon) photon->power /= choice_.probability(light);
+  return photon;
+}
+
+}  // namespace lobe

@@ -1,0 +1,156 @@
+#pragma once
+// The path tracer's loop, for any way of sampling directions: emission, emitter sampling with multiple importance
+// sampling (power heuristic), the delta part of materials, path termination. Only the smooth part's directions are the
+// sampler's.
+//
+// A sampler is a type with a nested Vertex, made where a path scatters at a smooth surface and gone before the next:
+//
+//   struct Sampler {
+//     class Vertex {
+//       Vertex(const Sampler& sampler, const SurfaceHit& hit);
+//       // One direction with its BSDF value and its density pdf(wi); nullopt: a sample of value zero. Counts the
+//       // strategy it chose.
+//       std::optional<BsdfSample> sample(Rng& rng, PathStatistics& statistics) const;
+//       // The density of sample over solid angle.
+//       float pdf(const Vec3& wi) const;
+//     };
+//   };
+//
+// Directions are local in hit.frame, whose z is on the geometric front side: hit.wo may have z < 0. hit.bsdf exists.
+
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "runtime/render/integrator.h"
+#include "runtime/render/render_scene.h"
+
+namespace lobe {
+
+struct PathOptions {
+  int maxDepth = std::numeric_limits<int>::max();  ///< segments: 1 shows emitters only, 2 adds direct light
+  int rouletteDepth = 5;                           ///< segments before paths may end by chance
+};
+
+/// At most this often does a path go on once Russian roulette may end it, so that every path ends.
+inline constexpr float kMaxSurvival = 0.95f;
+
+/// The share of an estimate whose own technique has density `own` where another has `other` (power heuristic).
+inline float misWeight(float own, float other) {
+  const float ratio = other / own;
+  return 1.0f / (1.0f + ratio * ratio);
+}
+
+template <class Sampler>
+class PathLoop {
+ public:
+  PathLoop(const RenderScene& scene, const PathOptions& options, const Sampler& sampler)
+      : scene_(scene), options_(options), sampler_(sampler) {}
+
+  Rgb radiance(const Ray& cameraRay, Rng& rng, PathStatistics& statistics) const {
+    Path path{cameraRay, rng, statistics};
+    ++statistics.paths;
+    for (path.depth = 1; path.depth <= options_.maxDepth; ++path.depth)
+      if (!advance(path)) break;
+    return path.radiance;
+  }
+
+ private:
+  struct Path {
+    Ray ray;
+    Rng& rng;
+    PathStatistics& statistics;
+    Rgb radiance = Rgb::Zero();
+    Rgb throughput = Rgb::Ones();
+    float pdf = 0;   // of the last direction; 0 after the camera or a delta part: emitter sampling could not find it
+    float eta2 = 1;  // how much refraction has compressed radiance so far, which termination has to undo
+    Vec3 previous = Vec3::Zero();
+    int depth = 0;
+  };
+
+  // One segment and what happens at its end; false: the path is over.
+  bool advance(Path& path) const {
+    ++path.statistics.segments;
+    const std::optional<SurfaceHit> hit = scene_.tracer.trace(path.ray);
+    if (!hit) {
+      const float light = path.pdf > 0.0f ? scene_.lights.environmentPdf(path.ray.direction) : 0.0f;
+      addEmission(path, scene_.lights.environmentRadiance(path.ray.direction), light);
+      return false;
+    }
+    if (hit->emitter) addEmission(path, emittedRadiance(*hit), path.pdf > 0.0f ? lightPdf(path, *hit) : 0.0f);
+    if (!hit->bsdf || path.depth >= options_.maxDepth || !sidesAgree(*hit, hit->woWorld, hit->wo)) return false;
+    return survives(path) && scatter(path, *hit);
+  }
+
+  float lightPdf(const Path& path, const SurfaceHit& hit) const { return scene_.lights.pdf(path.previous, hit); }
+
+  void addEmission(Path& path, const Rgb& emitted, float lightDensity) const {
+    const float weight = path.pdf > 0.0f ? misWeight(path.pdf, lightDensity) : 1.0f;
+    path.radiance += path.throughput * emitted * weight;
+  }
+
+  bool survives(Path& path) const {
+    if (path.depth < options_.rouletteDepth) return true;
+    const float survival = std::min(path.throughput.maxCoeff() * path.eta2, kMaxSurvival);
+    if (path.rng.uniform() >= survival) return false;
+    path.throughput /= survival;
+    return true;
+  }
+
+  bool scatter(Path& path, const SurfaceHit& hit) const {
+    const float deltaShare = hit.bsdf->deltaProbability(hit.wo, hit.uv);
+    if (deltaShare < 1.0f) {
+      const typename Sampler::Vertex vertex(sampler_, hit);
+      addDirectLight(path, hit, vertex, 1.0f - deltaShare);
+      if (deltaShare <= 0.0f || path.rng.uniform() >= deltaShare)
+        return scatterSmooth(path, hit, vertex, 1.0f - deltaShare);
+    }
+    return scatterDelta(path, hit, deltaShare);
+  }
+
+  void addDirectLight(Path& path, const SurfaceHit& hit, const typename Sampler::Vertex& vertex, float share) const {
+    const float choice = path.rng.uniform();
+    const std::optional<LightSample> light = scene_.lights.sample(hit.position, choice, path.rng.uniform2());
+    if (!light) return;
+    const Vec3 wi = hit.frame.toLocal(light->wi);
+    if (!sidesAgree(hit, light->wi, wi)) return;
+    const Rgb value = hit.bsdf->eval(hit.wo, wi, hit.uv) * light->radiance;
+    if (!(value.maxCoeff() > 0.0f)) return;
+    ++path.statistics.shadowRays;
+    if (!scene_.visible(hit, *light)) return;
+    const float weight = misWeight(light->pdf, share * vertex.pdf(wi));
+    path.radiance += path.throughput * value * (std::abs(wi.z()) * weight / light->pdf);
+  }
+
+  bool scatterSmooth(Path& path, const SurfaceHit& hit, const typename Sampler::Vertex& vertex, float share) const {
+    const std::optional<BsdfSample> sample = vertex.sample(path.rng, path.statistics);
+    if (!sample) return false;
+    const float pdf = share * sample->pdf;
+    path.pdf = pdf;
+    return continueAlong(path, hit, sample->wi, sample->f * (std::abs(sample->wi.z()) / pdf));
+  }
+
+  bool scatterDelta(Path& path, const SurfaceHit& hit, float share) const {
+    path.statistics.count(SamplingStrategy::delta);
+    const std::optional<DeltaSample> sample = hit.bsdf->sampleDelta(hit.wo, hit.uv, path.rng.uniform());
+    if (!sample) return false;
+    path.pdf = 0.0f;
+    path.eta2 *= sample->eta * sample->eta;
+    return continueAlong(path, hit, sample->wi, sample->weight / share);
+  }
+
+  bool continueAlong(Path& path, const SurfaceHit& hit, const Vec3& wi, const Rgb& weight) const {
+    const Vec3 direction = hit.frame.toWorld(wi).normalized();
+    if (!sidesAgree(hit, direction, wi)) return false;
+    path.throughput *= weight;
+    path.previous = hit.position;
+    path.ray = spawnRay(hit, direction);
+    return path.throughput.maxCoeff() > 0.0f;
+  }
+
+  const RenderScene& scene_;
+  const PathOptions& options_;
+  const Sampler& sampler_;
+};
+
+}  // namespace lobe

@@ -1,0 +1,160 @@
+#include "runtime/render/surface_hit.h"
+
+#include "materials/sampling.h"
+
+namespace lobe {
+namespace {
+
+// In units of the largest coordinate. Intersections err by a few 2^-24 of it; this leaves room for grazing rays.
+constexpr float kOffset = 0x1p-18f;
+// A plane that contains a coordinate plane has no error along its normal, but an offset of zero would be no offset.
+constexpr float kLeastOffset = 0x1p-24f;
+
+// extent: the largest absolute coordinates of the primitive. Only errors along the normal matter.
+float offsetLength(const Vec3& normal, const Vec3& extent) {
+  return kOffset * normal.cwiseAbs().dot(extent) + kLeastOffset * extent.maxCoeff();
+}
+
+struct Derivatives {
+  Vec3 dpdu = Vec3::Zero();
+  Vec3 dpdv = Vec3::Zero();
+};
+
+Vec3 triangleNormal(const Vec3& edge1, const Vec3& edge2) {
+  // Scaled first, so that the cross product of tiny edges does not underflow.
+  const float size = std::max(edge1.cwiseAbs().maxCoeff(), edge2.cwiseAbs().maxCoeff());
+  return (edge1 / size).cross(edge2 / size).normalized();
+}
+
+Derivatives triangleDerivatives(const TriangleMesh& mesh, std::uint32_t triangle) {
+  if (mesh.uvs.empty()) return {};
+  const auto& [i, j, k] = mesh.triangles[triangle];
+  const Vec2 d1 = mesh.uvs[j] - mesh.uvs[i];
+  const Vec2 d2 = mesh.uvs[k] - mesh.uvs[i];
+  const float determinant = d1.x() * d2.y() - d1.y() * d2.x();
+  if (determinant == 0.0f) return {};
+  const Vec3 edge1 = mesh.positions[j] - mesh.positions[i];
+  const Vec3 edge2 = mesh.positions[k] - mesh.positions[i];
+  const float inverse = 1.0f / determinant;
+  const Derivatives d{(edge1 * d2.y() - edge2 * d1.y()) * inverse, (edge2 * d1.x() - edge1 * d2.x()) * inverse};
+  return d.dpdu.allFinite() && d.dpdv.allFinite() ? d : Derivatives{};
+}
+
+Derivatives sphereDerivatives(const Sphere& sphere, const Vec3& position) {
+  const Vec3 p = position - sphere.centre;
+  const float radial = p.head<2>().norm();
+  if (radial == 0.0f) return {};
+  const Vec3 dpdv(p.x() * p.z() / radial, p.y() * p.z() / radial, -radial);
+  return {2.0f * kPi * Vec3(-p.y(), p.x(), 0.0f), kPi * dpdv};
+}
+
+Derivatives diskDerivatives(const Disk& disk, float x, float y) {
+  const float radius = std::sqrt(x * x + y * y);
+  if (radius == 0.0f) return {disk.u, disk.v};
+  return {(x * disk.u + y * disk.v) / radius, 2.0f * kPi * (x * disk.v - y * disk.u)};
+}
+
+Vec3 interpolatedNormal(const TriangleMesh& mesh, const Hit& hit, const Vec3& geometric) {
+  if (mesh.normals.empty()) return geometric;
+  const auto& [i, j, k] = mesh.triangles[hit.primitive];
+  const Vec3 n = (1.0f - hit.u - hit.v) * mesh.normals[i] + hit.u * mesh.normals[j] + hit.v * mesh.normals[k];
+  const float length = n.norm();
+  return length > 0.0f && std::isfinite(length) ? Vec3(n / length) : geometric;
+}
+
+struct Resolved {
+  SurfacePoint point;
+  Vec3 shadingNormal;
+  Derivatives derivatives;
+};
+
+Resolved resolve(const TriangleMesh& mesh, const Ray&, const Hit& hit) {
+  const SurfacePoint point = pointOnTriangle(mesh, hit.primitive, hit.u, hit.v);
+  return {point, interpolatedNormal(mesh, hit, point.normal), triangleDerivatives(mesh, hit.primitive)};
+}
+
+Resolved resolve(const Sphere& sphere, const Ray& ray, const Hit& hit) {
+  const Vec3 outward = (ray.origin + hit.t * ray.direction - sphere.centre).normalized();
+  const SurfacePoint point = pointOnSphere(sphere, outward);
+  return {point, point.normal, sphereDerivatives(sphere, point.position)};
+}
+
+Resolved resolve(const Disk& disk, const Ray& ray, const Hit& hit) {
+  const Vec3 p = ray.origin + hit.t * ray.direction - disk.centre;
+  const float x = p.dot(disk.u) / disk.u.squaredNorm();
+  const float y = p.dot(disk.v) / disk.v.squaredNorm();
+  const SurfacePoint point = pointOnDisk(disk, x, y);
+  return {point, point.normal, diskDerivatives(disk, x, y)};
+}
+
+Vec3 facing(const Vec3& normal, const Vec3& side) {
+  return normal.dot(side) < 0.0f ? Vec3(-normal) : normal;
+}
+
+Frame shadingFrame(const Bsdf* bsdf, const Resolved& r) {
+  const Frame frame = Frame::fromTangent(facing(r.shadingNormal, r.point.normal), r.derivatives.dpdu);
+  if (!bsdf) return frame;
+  const Vec3 local =
+      bsdf->perturbedNormal(r.point.uv, frame.toLocal(r.derivatives.dpdu), frame.toLocal(r.derivatives.dpdv));
+  if (local == Vec3::UnitZ() || !local.allFinite()) return frame;
+  return Frame::fromTangent(facing(frame.toWorld(local).normalized(), r.point.normal), r.derivatives.dpdu);
+}
+
+}  // namespace
+
+SurfacePoint pointOnTriangle(const TriangleMesh& mesh, std::uint32_t triangle, float b1, float b2) {
+  const auto& [i, j, k] = mesh.triangles[triangle];
+  const Vec3& a = mesh.positions[i];
+  const Vec3& b = mesh.positions[j];
+  const Vec3& c = mesh.positions[k];
+  const float b0 = 1.0f - b1 - b2;
+  SurfacePoint point;
+  point.position = b0 * a + b1 * b + b2 * c;
+  point.normal = triangleNormal(b - a, c - a);
+  point.uv = mesh.uvs.empty() ? Vec2(b1, b2) : Vec2(b0 * mesh.uvs[i] + b1 * mesh.uvs[j] + b2 * mesh.uvs[k]);
+  point.offset = offsetLength(point.normal, a.cwiseAbs().cwiseMax(b.cwiseAbs()).cwiseMax(c.cwiseAbs()));
+  return point;
+}
+
+SurfacePoint pointOnSphere(const Sphere& sphere, const Vec3& outward) {
+  SurfacePoint point;
+  point.position = sphere.centre + sphere.radius * outward;
+  point.normal = sphere.flipped ? Vec3(-outward) : outward;
+  const float azimuth = std::atan2(outward.y(), outward.x()) * (0.5f * kInvPi);
+  const float polar = std::atan2(outward.head<2>().norm(), outward.z()) * kInvPi;
+  point.uv = {azimuth < 0.0f ? azimuth + 1.0f : azimuth, polar};
+  point.offset = offsetLength(point.normal, sphere.centre.cwiseAbs() + Vec3::Constant(sphere.radius));
+  return point;
+}
+
+SurfacePoint pointOnDisk(const Disk& disk, float x, float y) {
+  SurfacePoint point;
+  point.position = disk.centre + x * disk.u + y * disk.v;
+  point.normal = triangleNormal(disk.u, disk.v);
+  const float azimuth = std::atan2(y, x) * (0.5f * kInvPi);
+  point.uv = {std::sqrt(x * x + y * y), azimuth < 0.0f ? azimuth + 1.0f : azimuth};
+  point.offset = offsetLength(point.normal, disk.centre.cwiseAbs() + disk.u.cwiseAbs() + disk.v.cwiseAbs());
+  return point;
+}
+
+SurfaceHit makeSurfaceHit(const Scene& scene, const Ray& ray, const Hit& hit) {
+  const Shape& shape = scene.shapes[hit.shape];
+  const Resolved r = std::visit([&](const auto& geometry) { return resolve(geometry, ray, hit); }, shape.geometry);
+  SurfaceHit result;
+  static_cast<SurfacePoint&>(result) = r.point;
+  result.bsdf = shape.material < 0 ? nullptr : scene.materials[shape.material].bsdf.get();
+  result.emitter = shape.emitter ? &*shape.emitter : nullptr;
+  result.frame = shadingFrame(result.bsdf, r);
+  result.woWorld = -ray.direction;
+  result.wo = result.frame.toLocal(result.woWorld);
+  result.distance = hit.t;
+  result.shape = static_cast<int>(hit.shape);
+  return result;
+}
+
+Rgb emittedRadiance(const SurfaceHit& hit) {
+  if (!hit.emitter || hit.normal.dot(hit.woWorld) <= 0.0f) return Rgb::Zero();
+  return hit.emitter->radiance->eval(hit.uv);
+}
+
+}  // namespace lobe
