@@ -37,21 +37,26 @@ struct StepwiseEmOptions {
   float priorV = 0.01f;
   float backgroundPrior = 8.0f;  ///< Dirichlet pseudo-count of the background component
   float initialBackground = 0.5f;
-  float initialVariance = 0.31f;
-  float minDeterminant = 1e-11f;  ///< a covariance below is reset to the initial one
-  double tolerance = 1e-3;        ///< of the first fit
+  float initialVariance = 0.04f;  ///< of every component at the start of the first fit
+  float minDeterminant = 1e-11f;  ///< its square root is the floor of each eigenvalue of Σ
+  double tolerance = 3e-3;        ///< the first fit ends at a smaller change of the mean log-likelihood (nats)
   int maxSweeps = 250;            ///< of the first fit
 };
 
 /// An illumination mixture in training: u · 2cosθ/π + (1−u) · Σ π_k N_k over the disc, with its sufficient statistics.
 /// The background component 2cosθ/π (cosθ = 1 − |y|²) is what constant radiance makes of L cosθ.
+///
+/// Points on or outside the disc's edge, and those whose weight is not positive and finite, are ignored everywhere. The
+/// mixture is valid whatever the points: fewer of them than components, all in one place, at the edge, or with weights
+/// of any magnitude. Scaling all weights that were ever passed changes nothing. Points may come in any order, sorted
+/// too: every sweep strides over them.
 class StepwiseEm {
  public:
   /// components Gaussians, 1 ≤ components ≤ kMaxIlluminationComponents.
   StepwiseEm(int components, const StepwiseEmOptions& options);
 
-  /// First fit: starts from the points themselves (deterministically) and sweeps until the likelihood settles. The
-  /// samples seen become points.size(). Points outside the disc or of weight ≤ 0 are ignored.
+  /// First fit, from nothing: starts from the points themselves (deterministically) and sweeps until the likelihood
+  /// settles. The samples seen become the number of points that count; if there is none, nothing changes.
   void fit(std::span<const WeightedPoint> points);
 
   /// One sweep of on-line EM over new points.
@@ -71,7 +76,7 @@ class StepwiseEm {
   };
   template <int lanes>
   class Sweep;
-  void start(std::span<const WeightedPoint> points);
+  void spread(std::span<const WeightedPoint> points);
   double sweep(std::span<const WeightedPoint> points, long priorLimit);
 
   StepwiseEmOptions options_;

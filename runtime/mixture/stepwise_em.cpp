@@ -3,12 +3,14 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <stdexcept>
 
 #include "runtime/mixture/eigenvalue_floor.h"
 #include "runtime/mixture/em.h"
 #include "runtime/mixture/fast_exp.h"
 #include "runtime/mixture/product.h"
+#include "runtime/mixture/random.h"
 
 namespace lobe {
 
@@ -16,12 +18,34 @@ namespace {
 
 constexpr float kInvPi = std::numbers::inv_pi_v<float>;
 
+constexpr std::uint64_t kStartSeed = 7;
+
 bool counts(const WeightedPoint& p) {
   return p.weight > 0 && std::isfinite(p.weight) && insideDisc(p.y);
 }
 
 float backgroundPdf(const Vec2& y) {
   return 2.0f * kInvPi * discCosine(y);
+}
+
+// The first index at which the running sum of the shares exceeds `target`; the last with a share if rounding hides it.
+std::size_t choose(std::span<const double> shares, double target) {
+  std::size_t last = 0;
+  for (std::size_t i = 0; i < shares.size(); ++i) {
+    if (!(shares[i] > 0)) continue;
+    last = i;
+    if (target < shares[i]) break;
+    target -= shares[i];
+  }
+  return last;
+}
+
+// A step that visits every one of n points once, neighbours in the given order far apart: on-line EM forgets, and from
+// points sorted by direction it would keep the last directions only.
+std::size_t scatteringStride(std::size_t n) {
+  auto stride = static_cast<std::size_t>(static_cast<double>(n) * (std::numbers::phi - 1));
+  while (std::gcd(stride, n) > 1) ++stride;
+  return stride;
 }
 
 }  // namespace
@@ -156,23 +180,37 @@ StepwiseEm::StepwiseEm(int components, const StepwiseEmOptions& options)
   if (components < 1 || components > kMaxIlluminationComponents)
     throw std::runtime_error("the number of components of an illumination mixture must be between 1 and 16");
   const Covariance wide{options.initialVariance, 0.0f, options.initialVariance};
-  gaussians_.assign(static_cast<std::size_t>(components), {1.0f / static_cast<float>(components), 0.0f, 0.0f, wide});
+  // On a spiral that covers the disc evenly.
+  constexpr float kGoldenAngle = 2.39996323f;
+  const auto count = static_cast<float>(components);
+  for (int k = 0; k < components; ++k) {
+    const float radius = std::sqrt((static_cast<float>(k) + 0.5f) / count),
+                angle = kGoldenAngle * static_cast<float>(k);
+    gaussians_.push_back({1.0f / count, radius * std::cos(angle), radius * std::sin(angle), wide});
+  }
   statistics_.resize(gaussians_.size());
 }
 
-// Means at the middles of K equal shares of the points' weight, in the given order.
-void StepwiseEm::start(std::span<const WeightedPoint> points) {
-  double total = 0;
-  for (const WeightedPoint& p : points) total += counts(p) ? p.weight : 0;
-  const double share = total / static_cast<double>(gaussians_.size());
-  double passed = 0;
-  std::size_t k = 0;
-  for (const WeightedPoint& p : points) {
-    if (!counts(p)) continue;
-    passed += p.weight;
-    for (; k < gaussians_.size() && passed >= (static_cast<double>(k) + 0.5) * share; ++k) {
-      gaussians_[k].meanX = p.y.x();
-      gaussians_[k].meanY = p.y.y();
+// Chooses the means among the points, each in proportion to weight × squared distance from those chosen before
+// (k-means++, Arthur and Vassilvitskii 2007). Of the starts tried it is the one that no order of points and no
+// magnitude of weights led astray. Components that no point is left for stay where the constructor put them.
+void StepwiseEm::spread(std::span<const WeightedPoint> points) {
+  Rng rng(kStartSeed);
+  // Weight × squared distance to the nearest mean; at first just the weight.
+  std::vector<double> pull;
+  pull.reserve(points.size());
+  for (const WeightedPoint& p : points) pull.push_back(counts(p) ? p.weight : 0.0);
+  for (Gaussian& g : gaussians_) {
+    const double total = std::accumulate(pull.begin(), pull.end(), 0.0);
+    if (!(total > 0)) break;
+    const Vec2 mean = points[choose(pull, total * rng.uniform())].y;
+    g.meanX = mean.x();
+    g.meanY = mean.y();
+    const bool first = &g == &gaussians_.front();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (!(pull[i] > 0)) continue;
+      const double fresh = static_cast<double>(points[i].weight) * (points[i].y - mean).squaredNorm();
+      pull[i] = first ? fresh : std::min(pull[i], fresh);
     }
   }
 }
@@ -181,11 +219,11 @@ void StepwiseEm::fit(std::span<const WeightedPoint> points) {
   const auto valid = std::count_if(points.begin(), points.end(), counts);
   if (valid == 0) return;
   *this = StepwiseEm(static_cast<int>(gaussians_.size()), options_);
-  start(points);
+  spread(points);
   double previous = -std::numeric_limits<double>::infinity();
   for (int i = 0; i < options_.maxSweeps; ++i) {
     const double likelihood = sweep(points, valid);
-    if (std::abs(likelihood - previous) <= options_.tolerance * std::abs(likelihood)) break;
+    if (std::abs(likelihood - previous) <= options_.tolerance) break;
     previous = likelihood;
   }
   samples_ = valid;
@@ -201,7 +239,9 @@ double StepwiseEm::sweep(std::span<const WeightedPoint> points, long priorLimit)
     Sweep<lanes> state(*this);
     double likelihood = 0, weight = 0;
     int waiting = 0;
-    for (const WeightedPoint& p : points) {
+    const std::size_t stride = scatteringStride(points.size());
+    for (std::size_t i = 0, at = 0; i < points.size(); ++i, at = (at + stride) % points.size()) {
+      const WeightedPoint& p = points[at];
       if (!counts(p)) continue;
       const float density = state.add(p, std::pow(static_cast<float>(samples_ + 1), -options_.stepExponent));
       ++samples_;
