@@ -1,0 +1,195 @@
+#include "fitter/lobe_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "fitter/disc_mass.h"
+#include "fitter/low_discrepancy.h"
+#include "runtime/mixture/em.h"
+
+namespace lobe {
+namespace {
+
+// The start covariance of every component, in units of the lobe's own.
+constexpr float kStartScale = 0.5f;
+// Floor of the components' variance, in units of the smaller variance of the lobe: no spikes on single points.
+constexpr double kVarianceFloor = 1e-3;
+// Single precision resolves the disc to about 1e-7.
+constexpr double kSharpest = 1e-5;
+constexpr float kBroadVariance = 0.25f;
+
+[[noreturn]] void refuse(const Lobe& lobe, const Vec3& wo, const std::string& fault) {
+  throw std::runtime_error(fmt::format("lobe {} cannot be fitted for the direction ({}, {}, {}): {}", lobe.summary(),
+                                       wo.x(), wo.y(), wo.z(), fault));
+}
+
+struct Draw {
+  Vec3 wi;
+  double value;  // ρ, no cosine
+  double pdf;
+};
+
+double evaluate(const Lobe& lobe, const Vec3& wo, const Vec3& wi) {
+  const double value = lobe.eval(wo, wi);
+  if (!(value >= 0 && std::isfinite(value))) refuse(lobe, wo, fmt::format("its value is {}", value));
+  return value;
+}
+
+/// Points first … first+count−1 of the lobe's own sampler, without those of value zero.
+std::vector<Draw> drawFromLobe(const Lobe& lobe, const Vec3& wo, long first, std::uint32_t count) {
+  std::vector<Draw> draws;
+  draws.reserve(count);
+  for (long i = first; i < first + static_cast<long>(count); ++i) {
+    const std::optional<LobeSample> s = lobe.sample(wo, squarePoint(i));
+    if (!s || s->wi.z() <= 0) continue;
+    if (!(s->pdf > 0 && std::isfinite(s->pdf))) refuse(lobe, wo, fmt::format("its sampler has the density {}", s->pdf));
+    const double value = evaluate(lobe, wo, s->wi);
+    if (value > 0) draws.push_back({s->wi, value, s->pdf});
+  }
+  return draws;
+}
+
+std::vector<WeightedPoint> weightedPoints(const std::vector<Draw>& draws) {
+  std::vector<WeightedPoint> points;
+  points.reserve(draws.size());
+  for (const Draw& d : draws) points.push_back({toDisc(d.wi), static_cast<float>(d.value / d.pdf)});
+  return points;
+}
+
+struct Spread {
+  double xx = 0, xy = 0, yy = 0;
+  double smallerVariance() const { return 0.5 * (xx + yy) - std::hypot(0.5 * (xx - yy), xy); }
+};
+
+Spread spreadOf(const std::vector<WeightedPoint>& points) {
+  double weight = 0, x = 0, y = 0;
+  for (const WeightedPoint& p : points) weight += p.weight, x += p.weight * p.y.x(), y += p.weight * p.y.y();
+  Spread spread;
+  for (const WeightedPoint& p : points) {
+    const double dx = p.y.x() - x / weight, dy = p.y.y() - y / weight, share = p.weight / weight;
+    spread.xx += share * dx * dx;
+    spread.xy += share * dx * dy;
+    spread.yy += share * dy * dy;
+  }
+  return spread;
+}
+
+/// The first points as means; the sequence is even, so they cover the lobe.
+Mixture startMixture(const std::vector<WeightedPoint>& points, const Spread& spread, std::size_t components) {
+  const std::size_t count = std::min(components, points.size());
+  Covariance cov{kStartScale * static_cast<float>(spread.xx), kStartScale * static_cast<float>(spread.xy),
+                 kStartScale * static_cast<float>(spread.yy)};
+  Mixture mixture;
+  for (std::size_t k = 0; k < count; ++k)
+    mixture.push_back({1.0f / static_cast<float>(count), points[k].y.x(), points[k].y.y(), cov});
+  return mixture;
+}
+
+Mixture fitMixture(const Lobe& lobe, const Vec3& wo, const std::vector<Draw>& draws, const FitSettings& settings) {
+  if (draws.empty()) return {{1.0f, 0.0f, 0.0f, Covariance{kBroadVariance, 0.0f, kBroadVariance}}};
+  const std::vector<WeightedPoint> points = weightedPoints(draws);
+  Spread spread = spreadOf(points);
+  if (points.size() < 3) spread = {kBroadVariance, 0, kBroadVariance};
+  if (!(spread.smallerVariance() > kSharpest * kSharpest)) refuse(lobe, wo, "it is too sharp, a mirror would do");
+  Mixture mixture = startMixture(points, spread, settings.components);
+  WeightedEmOptions options;
+  options.minVariance = kVarianceFloor * spread.smallerVariance();
+  weightedEm(points, mixture, options);
+  std::erase_if(mixture, [](const Gaussian& g) { return !(g.weight > 0); });
+  if (settings.reduction > 0) reduce(mixture, settings.reduction);
+  return mixture;
+}
+
+/// Weights that sum to one in single precision.
+void normalise(Mixture& mixture) {
+  double sum = 0;
+  for (const Gaussian& g : mixture) sum += g.weight;
+  for (Gaussian& g : mixture) g.weight = static_cast<float>(g.weight / sum);
+}
+
+/// p of Quality over solid angle, with dω = 2 dA.
+class GradedDensity {
+ public:
+  GradedDensity(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> mixture)
+      : lobe_(lobe), wo_(wo), mixture_(mixture), cosineMass_(discMass(mixture).cosine) {}
+  double cosineMass() const { return cosineMass_; }
+  double operator()(const Vec3& wi, double ownPdf) const {
+    const double guided = 0.5 * mixturePdf(mixture_, toDisc(wi)) * wi.z() / cosineMass_;
+    return kDefensiveShare * ownPdf + (1 - kDefensiveShare) * guided;
+  }
+  double operator()(const Vec3& wi) const { return (*this)(wi, lobe_.pdf(wo_, wi)); }
+
+ private:
+  const Lobe& lobe_;
+  const Vec3& wo_;
+  std::span<const Gaussian> mixture_;
+  double cosineMass_;
+};
+
+struct Moments {
+  double first = 0, second = 0;
+  double relativeVariance() const { return first > 0 ? std::max(0.0, second / (first * first) - 1) : 0; }
+};
+
+/// ∫ f and ∫ f²/p from points of G, times `share`. G is drawn in place of G cosθ/A and weighted by cosθ/A.
+Moments fromMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> mixture, const GradedDensity& p,
+                    std::uint32_t samples) {
+  Moments sum;
+  for (std::uint32_t i = 0; i < samples; ++i) {
+    const Eigen::Vector3f u = cubePoint(i);
+    const Vec2 y = sampleMixture(mixture, u.x(), u.tail<2>());
+    if (!insideDisc(y)) continue;
+    const Vec3 wi = fromDisc(y);
+    const double density = p(wi);
+    if (!(density > 0)) continue;
+    const double ratio = evaluate(lobe, wo, wi) * wi.z() / density, weight = wi.z() / p.cosineMass();
+    sum.first += weight * ratio / samples;
+    sum.second += weight * ratio * ratio / samples;
+  }
+  return sum;
+}
+
+}  // namespace
+
+Quality gradeMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> mixture, std::uint32_t samples) {
+  const GradedDensity p(lobe, wo, mixture);
+  Moments own, covered;  // own: drawn from q as a part of p; covered: ∫ f and ∫ f²/p by importance sampling from q
+  for (const Draw& d : drawFromLobe(lobe, wo, samples, samples)) {
+    const double f = d.value * d.wi.z(), ratio = f / p(d.wi, d.pdf);
+    own.first += ratio / samples;
+    own.second += ratio * ratio / samples;
+    covered.first += f / d.pdf / samples;
+    covered.second += f * ratio / d.pdf / samples;
+  }
+  const Moments guided = fromMixture(lobe, wo, mixture, p, samples);
+  constexpr double beta = kDefensiveShare;
+  const Moments drawn{beta * own.first + (1 - beta) * guided.first, beta * own.second + (1 - beta) * guided.second};
+  return {drawn.relativeVariance(), covered.relativeVariance()};
+}
+
+FittedRecord fitLobe(const Lobe& lobe, const Vec3& wo, const FitSettings& settings) {
+  const std::vector<Draw> draws = drawFromLobe(lobe, wo, 0, settings.samples);
+  FittedRecord fitted{fitMixture(lobe, wo, draws, settings), {}};
+  normalise(fitted.mixture);
+  double integral = 0, albedo = 0;
+  for (const Draw& d : draws) {
+    integral += d.value / d.pdf;
+    albedo += d.value * d.wi.z() / d.pdf;
+  }
+  const DiscMass mass = discMass(fitted.mixture);
+  const Quality quality = gradeMixture(lobe, wo, fitted.mixture, settings.samples);
+  CacheRecord& r = fitted.record;
+  r.count = static_cast<std::uint32_t>(fitted.mixture.size());
+  r.integral = static_cast<float>(integral / settings.samples);
+  r.albedo = static_cast<float>(albedo / settings.samples);
+  r.cosineMass = static_cast<float>(mass.cosine);
+  r.outside = static_cast<float>(std::clamp(1 - mass.inside, 0.0, 1.0));
+  r.nev = static_cast<float>(quality.nev);
+  r.nevCoverage = static_cast<float>(quality.coverage);
+  return fitted;
+}
+
+}  // namespace lobe

@@ -1,0 +1,40 @@
+#pragma once
+// One record: the mixture of a lobe for one direction wo, by weighted EM, and how good it is.
+//
+// The mixture is fitted to ρ without the cosine (the cosine belongs to the illumination), over the disc of wi.
+
+#include <span>
+
+#include "materials/lobe.h"
+#include "runtime/mixture/gaussian.h"
+#include "schema/lobe_cache.h"
+
+namespace lobe {
+
+/// Raised when the code of the fit changes what it returns; caches of another revision are stale.
+inline constexpr std::uint32_t kFitRevision = 1;
+
+/// The share of BSDF sampling in the density that a fit is graded with.
+inline constexpr double kDefensiveShare = 0.1;
+
+/// NEV of one sample for f = ρ cosθ against p = 0.1 q + 0.9 G cosθ / ∫ G cosθ dA, q the lobe's own density: the
+/// relative variance of f/p. Samples that the sampler rejects count, with f = 0. 0 where nothing is reflected.
+struct Quality {
+  double nev;       ///< drawn from p
+  double coverage;  ///< the same quantity drawn from q, which also sees what the mixture misses
+};
+
+/// Grades any mixture over the disc (weights sum to one) with `samples` points of each density. The points are none of
+/// those that fitLobe draws with as many samples.
+Quality gradeMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> mixture, std::uint32_t samples);
+
+struct FittedRecord {
+  Mixture mixture;     ///< weights sum to one
+  CacheRecord record;  ///< first is 0, count is mixture.size()
+};
+
+/// Fits the lobe for wo (unit, z > 0). Deterministic. Where nothing is reflected the record has integral and albedo 0
+/// and a broad component. Throws std::runtime_error when the lobe returns numbers that are not finite, or is too sharp.
+FittedRecord fitLobe(const Lobe& lobe, const Vec3& wo, const FitSettings& settings);
+
+}  // namespace lobe

@@ -1,0 +1,113 @@
+// lobefit SCENE.xml [-o DIR]: compiles the lobes of a scene's materials into cache files.
+
+#include <chrono>
+#include <optional>
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+#include <nlohmann/json.hpp>
+
+#include "fitter/compile.h"
+#include "fitter/report.h"
+#include "scenes/reader.h"
+#include "scenes/tool.h"
+
+namespace {
+
+using namespace lobe;
+
+struct Options {
+  std::string scene;
+  CompileOptions compile;
+  ReadOptions read;
+  int threads = 0;
+  bool json = false;
+};
+
+void declare(CLI::App& app, Options& o) {
+  app.add_option("scene", o.scene, "Mitsuba scene file")->required()->type_name("SCENE.xml")->default_str("");
+  app.add_option("-o,--output", o.compile.directory, "Folder of the cache files, made when missing")->type_name("DIR");
+  app.add_option("--components", o.compile.settings.components, "Gaussians of a record before merging");
+  app.add_option("--elevations", o.compile.elevations, "Records of an isotropic lobe");
+  app.add_option("--directions", o.compile.directions, "Records of an anisotropic lobe");
+  app.add_option("--samples", o.compile.settings.samples, "Samples drawn for a record");
+  app.add_option("--reduction", o.compile.settings.reduction,
+                 "Merge components while the sum of Runnalls' costs stays below this; 0 keeps all");
+  app.add_flag("--force", o.compile.force, "Fit again what is up to date");
+  app.add_flag("--lenient", o.read.lenient, "Replace what the scene reader does not know, with a warning");
+  app.add_flag("--json", o.json, "Print the table as JSON");
+  addThreads(app, o.threads);
+  addDefinitions(app, o.read.definitions);
+}
+
+void validate(const Options& o) {
+  try {
+    o.compile.validate();
+  } catch (const std::runtime_error& e) {
+    throw UsageError(e.what());
+  }
+}
+
+double secondsToRun(const CompileJob& job, Progress& progress) {
+  const auto start = std::chrono::steady_clock::now();
+  runCompile(job, [&progress] { progress.advance(); });
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+std::vector<CacheReport> compileAll(const std::vector<CompileJob>& jobs) {
+  double records = 0;
+  for (const CompileJob& job : jobs) {
+    if (!job.upToDate) records += job.grid.count;
+    if (!job.stale.empty()) fmt::print(stderr, "lobefit: {} is made again: {}\n", job.path.string(), job.stale);
+  }
+  Progress progress("fitting", records);
+  std::vector<CacheReport> reports;
+  for (const CompileJob& job : jobs) {
+    const double seconds = job.upToDate ? 0 : secondsToRun(job, progress);
+    const LobeCache cache = LobeCache::open(job.path);
+    reports.push_back({job.path, job.info.summary, job.use.materials, summarise(cache), job.upToDate, seconds});
+  }
+  return reports;
+}
+
+void printResult(const std::vector<CacheReport>& reports, const Options& o) {
+  if (o.json) {
+    nlohmann::ordered_json json = nlohmann::ordered_json::array();
+    for (const CacheReport& r : reports) json.push_back(toJson(r));
+    fmt::print("{}\n", json.dump(2));
+    return;
+  }
+  if (!reports.empty()) printReports(reports, true, stdout);
+}
+
+void say(const std::vector<CacheReport>& reports, const Options& o) {
+  const auto fresh = std::ranges::count_if(reports, [](const CacheReport& r) { return !r.upToDate; });
+  if (reports.empty())
+    fmt::print(stderr, "lobefit: nothing to do: no material of {} has a lobe to fit\n", o.scene);
+  else if (fresh == 0)
+    fmt::print(stderr, "lobefit: nothing to do: all {} lobes in {} are up to date\n", reports.size(),
+               o.compile.directory.string());
+  else
+    fmt::print(stderr, "lobefit: {} of {} lobes written to {}\n", fresh, reports.size(), o.compile.directory.string());
+}
+
+void run(Options& o) {
+  validate(o);
+  std::optional<tbb::global_control> limit;
+  if (o.threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(o.threads));
+  o.read.geometry = false;
+  const Scene scene = readScene(o.scene, o.read);
+  for (const std::string& warning : scene.warnings) printWarning("lobefit", warning);
+  const std::vector<CacheReport> reports = compileAll(planCompile(collectLobes(scene), o.compile));
+  say(reports, o);
+  printResult(reports, o);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  return lobe::runTool(
+      "lobefit", "Compiles the reflectance lobes of a scene's materials into Gaussian-mixture caches.", argc, argv,
+      [&](CLI::App& app) { declare(app, options); }, [&] { run(options); });
+}

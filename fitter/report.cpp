@@ -1,0 +1,197 @@
+#include "fitter/report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "runtime/mixture/grid.h"
+#include "scenes/tool.h"
+
+namespace lobe {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  if (values.size() % 2 == 1) return *middle;
+  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
+}
+
+DirectionGrid gridOf(const LobeCache& cache) {
+  return {static_cast<GridKind>(cache.info().gridKind), static_cast<int>(cache.info().gridCount)};
+}
+
+const char* gridName(const DirectionGrid& grid) {
+  return grid.kind == GridKind::elevation ? "elevation" : "fibonacci";
+}
+
+struct Angles {
+  double elevation, azimuth;  // degrees, elevation from the normal
+};
+
+Angles anglesOf(const Vec3& w) {
+  const double degrees = 180 * std::numbers::inv_pi;
+  return {std::atan2(std::hypot(w.x(), w.y()), w.z()) * degrees, std::atan2(w.y(), w.x()) * degrees};
+}
+
+std::string percent(double share) {
+  return fmt::format("{:.2f} %", 100 * share);
+}
+
+/// Floats as the shortest decimal that reads back the same, not as the double they convert to.
+Json number(float value) {
+  return Json::parse(fmt::format("{}", value));
+}
+
+Json recordJson(const LobeCache& cache, const DirectionGrid& grid, std::size_t index) {
+  const CacheRecord& r = cache.records()[index];
+  const Angles angles = anglesOf(grid.direction(static_cast<int>(index)));
+  Json json{{"elevation", angles.elevation},
+            {"azimuth", angles.azimuth},
+            {"integral", number(r.integral)},
+            {"albedo", number(r.albedo)},
+            {"cosine_mass", number(r.cosineMass)},
+            {"outside", number(r.outside)},
+            {"nev", number(r.nev)},
+            {"nev_coverage", number(r.nevCoverage)},
+            {"components", Json::array()}};
+  for (const CacheComponent& c : cache.components(r))
+    json["components"].push_back({{"weight", number(c.weight)},
+                                  {"mean", {number(c.meanX), number(c.meanY)}},
+                                  {"covariance", {number(c.covXX), number(c.covXY), number(c.covYY)}}});
+  return json;
+}
+
+}  // namespace
+
+CacheSummary summarise(const LobeCache& cache) {
+  CacheSummary s;
+  std::vector<double> nev, coverage;
+  for (const CacheRecord& r : cache.records()) {
+    s.meanComponents += r.count;
+    s.outside += r.outside;
+    nev.push_back(r.nev);
+    coverage.push_back(r.nevCoverage);
+  }
+  s.records = nev.size();
+  s.meanComponents /= static_cast<double>(s.records);
+  s.outside /= static_cast<double>(s.records);
+  s.nevMedian = median(nev);
+  s.nevWorst = std::ranges::max(nev);
+  s.coverageMedian = median(coverage);
+  s.coverageWorst = std::ranges::max(coverage);
+  s.bytes = cache.bytes();
+  return s;
+}
+
+std::string abbreviated(const std::vector<std::string>& names) {
+  if (names.empty()) return "-";
+  return names.size() == 1 ? names.front() : fmt::format("{} + {} more", names.front(), names.size() - 1);
+}
+
+void printReports(const std::vector<CacheReport>& reports, bool showRun, std::FILE* out) {
+  std::vector<std::string> header{"lobe", "records", "comp.", "NEV", "worst", "coverage", "worst", "outside", "bytes"};
+  if (showRun) {
+    header.insert(header.begin(), "material");
+    header.insert(header.end() - 1, "seconds");
+  }
+  Table table(header);
+  for (const CacheReport& r : reports) {
+    const CacheSummary& s = r.summary;
+    std::vector<std::string> cells{r.lobe,
+                                   std::to_string(s.records),
+                                   fmt::format("{:.2f}", s.meanComponents),
+                                   fmt::format("{:.3f}", s.nevMedian),
+                                   fmt::format("{:.3f}", s.nevWorst),
+                                   fmt::format("{:.3f}", s.coverageMedian),
+                                   fmt::format("{:.3f}", s.coverageWorst),
+                                   percent(s.outside),
+                                   std::to_string(s.bytes)};
+    if (showRun) {
+      cells.insert(cells.begin(), abbreviated(r.materials));
+      cells.insert(cells.end() - 1, r.upToDate ? "up to date" : fmt::format("{:.1f}", r.seconds));
+    }
+    table.add(std::move(cells));
+  }
+  table.print(out);
+}
+
+Json toJson(const CacheSummary& s) {
+  return {{"records", s.records},
+          {"mean_components", s.meanComponents},
+          {"nev_median", s.nevMedian},
+          {"nev_worst", s.nevWorst},
+          {"nev_coverage_median", s.coverageMedian},
+          {"nev_coverage_worst", s.coverageWorst},
+          {"outside", s.outside},
+          {"bytes", s.bytes}};
+}
+
+Json toJson(const CacheReport& r) {
+  Json json{{"file", r.path.string()}, {"lobe", r.lobe}, {"materials", r.materials}};
+  json.update(toJson(r.summary));
+  json["up_to_date"] = r.upToDate;
+  json["seconds"] = r.seconds;
+  return json;
+}
+
+Json toJson(const LobeCache& cache, const std::filesystem::path& path) {
+  const LobeCacheInfo& info = cache.info();
+  const DirectionGrid grid = gridOf(cache);
+  Json json{{"file", path.string()},
+            {"format", fmt::format("{}.{}", cache.header().major, cache.header().minor)},
+            {"hash", fmt::format("{:016x}", cache.hash())},
+            {"tool_version", info.toolVersion},
+            {"model", info.model},
+            {"model_revision", info.modelRevision},
+            {"lobe", info.summary},
+            {"key", info.key},
+            {"settings",
+             {{"method", info.settings.method},
+              {"components", info.settings.components},
+              {"samples", info.settings.samples},
+              {"reduction", number(info.settings.reduction)},
+              {"revision", info.settings.revision}}},
+            {"grid", {{"kind", gridName(grid)}, {"count", grid.count}}},
+            {"summary", toJson(summarise(cache))},
+            {"records", Json::array()}};
+  for (std::size_t i = 0; i < cache.records().size(); ++i) json["records"].push_back(recordJson(cache, grid, i));
+  return json;
+}
+
+void printHeader(const LobeCache& cache, const std::filesystem::path& path, std::FILE* out) {
+  const LobeCacheInfo& info = cache.info();
+  const FitSettings& s = info.settings;
+  const DirectionGrid grid = gridOf(cache);
+  fmt::print(out, "{}\n", path.string());
+  fmt::print(out, "  lobe      {} (model {}, revision {})\n", info.summary, info.model, info.modelRevision);
+  fmt::print(out, "  key       {}\n", info.key);
+  fmt::print(out, "  written   by Lobe {}, format {}.{}, hash {:016x}\n", info.toolVersion, cache.header().major,
+             cache.header().minor, cache.hash());
+  fmt::print(out, "  fit       {}, {} components, {} samples, reduction {}, revision {}\n", s.method, s.components,
+             s.samples, s.reduction, s.revision);
+  fmt::print(out, "  grid      {}, {} directions\n", gridName(grid), grid.count);
+}
+
+void printRecords(const LobeCache& cache, std::FILE* out) {
+  const DirectionGrid grid = gridOf(cache);
+  Table table(
+      {"record", "elevation", "azimuth", "comp.", "integral", "albedo", "cosine mass", "outside", "NEV", "coverage"});
+  for (std::size_t i = 0; i < cache.records().size(); ++i) {
+    const CacheRecord& r = cache.records()[i];
+    const Angles angles = anglesOf(grid.direction(static_cast<int>(i)));
+    table.add({std::to_string(i), fmt::format("{:.2f}", angles.elevation), fmt::format("{:.2f}", angles.azimuth),
+               std::to_string(r.count), fmt::format("{:.5g}", r.integral), fmt::format("{:.5f}", r.albedo),
+               fmt::format("{:.5f}", r.cosineMass), percent(r.outside), fmt::format("{:.4f}", r.nev),
+               fmt::format("{:.4f}", r.nevCoverage)});
+  }
+  table.print(out);
+}
+
+}  // namespace lobe
