@@ -27,8 +27,9 @@ struct Encoding {
   float exponent = 1.0f;
 };
 
-/// Reads PNG, JPEG, BMP, TGA, HDR (stb_image) and EXR (OpenEXR; R, G, B or a single luminance channel). Files with
-/// floating-point data are linear whatever the encoding says. Throws std::runtime_error that names the file and the fault.
+/// Reads PNG, JPEG, BMP, TGA, HDR (stb_image) and EXR (OpenEXR; R, G, B or a single luminance channel Y; the picture is
+/// the display window, black where the file has no pixels). Files with floating-point data are linear whatever the
+/// encoding says. Throws std::runtime_error that names the file and the fault.
 Image readImage(const std::filesystem::path& path, Encoding encoding = {});
 
 }  // namespace lobe
