@@ -1,0 +1,68 @@
+#include "materials/bitmap.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace lobe {
+namespace {
+
+/// The pixel column or row that index i, any number, falls on.
+int wrapIndex(long i, int size, Wrap mode) {
+  if (mode == Wrap::clamp) return static_cast<int>(std::clamp(i, 0l, static_cast<long>(size) - 1));
+  const long period = mode == Wrap::mirror ? 2l * size : size;
+  long r = i % period;
+  if (r < 0) r += period;
+  return static_cast<int>(r < size ? r : period - 1 - r);
+}
+
+// Beyond this, floats have no fraction left, and casts to integers would overflow further on.
+constexpr float kLargestCoordinate = 1e7f;
+
+Rgb meanOf(const Image& image) {
+  Eigen::Array3d sum = Eigen::Array3d::Zero();
+  for (const Rgb& pixel : image.pixels) sum += pixel.cast<double>();
+  return (sum / static_cast<double>(image.pixels.size())).cast<float>();
+}
+
+class BitmapTexture final : public Texture {
+ public:
+  BitmapTexture(std::shared_ptr<const Image> image, const BitmapOptions& options)
+      : image_(std::move(image)), options_(options), mean_(meanOf(*image_)) {}
+
+  Rgb eval(const Vec2& uv) const override {
+    const Vec2 st = uv.cwiseProduct(options_.uvScale) + options_.uvOffset;
+    const float x = st.x() * static_cast<float>(image_->width), y = st.y() * static_cast<float>(image_->height);
+    // Written so that NaN is caught, too.
+    if (!(std::abs(x) < kLargestCoordinate && std::abs(y) < kLargestCoordinate)) return mean_;
+    return options_.nearest ? pixel(std::floor(x), std::floor(y)) : bilinear(x - 0.5f, y - 0.5f);
+  }
+
+  Rgb mean() const override { return mean_; }
+
+ private:
+  Rgb bilinear(float x, float y) const {
+    const float x0 = std::floor(x), y0 = std::floor(y), fx = x - x0, fy = y - y0;
+    const Rgb top = pixel(x0, y0) * (1 - fx) + pixel(x0 + 1, y0) * fx;
+    const Rgb bottom = pixel(x0, y0 + 1) * (1 - fx) + pixel(x0 + 1, y0 + 1) * fx;
+    return top * (1 - fy) + bottom * fy;
+  }
+
+  const Rgb& pixel(float x, float y) const {
+    return image_->at(wrapIndex(static_cast<long>(x), image_->width, options_.wrapU),
+                      wrapIndex(static_cast<long>(y), image_->height, options_.wrapV));
+  }
+
+  std::shared_ptr<const Image> image_;
+  BitmapOptions options_;
+  Rgb mean_;
+};
+
+}  // namespace
+
+TexturePtr makeBitmap(std::shared_ptr<const Image> image, const BitmapOptions& options) {
+  if (!image || image->pixels.empty()) throw std::runtime_error("a bitmap texture needs an image with pixels");
+  return std::make_shared<BitmapTexture>(std::move(image), options);
+}
+
+}  // namespace lobe

@@ -1,0 +1,33 @@
+#include "materials/checkerboard.h"
+
+#include <cmath>
+
+namespace lobe {
+namespace {
+
+class CheckerboardTexture final : public Texture {
+ public:
+  CheckerboardTexture(TexturePtr a, TexturePtr b, const Vec2& uvScale, const Vec2& uvOffset)
+      : a_(std::move(a)), b_(std::move(b)), uvScale_(uvScale), uvOffset_(uvOffset) {}
+
+  Rgb eval(const Vec2& uv) const override {
+    const Vec2 st = uv.cwiseProduct(uvScale_) + uvOffset_;
+    return (upperHalf(st.x()) == upperHalf(st.y()) ? a_ : b_)->eval(uv);
+  }
+
+  Rgb mean() const override { return 0.5f * (a_->mean() + b_->mean()); }
+
+ private:
+  static bool upperHalf(float x) { return x - std::floor(x) > 0.5f; }
+
+  TexturePtr a_, b_;
+  Vec2 uvScale_, uvOffset_;
+};
+
+}  // namespace
+
+TexturePtr makeCheckerboard(TexturePtr a, TexturePtr b, Vec2 uvScale, Vec2 uvOffset) {
+  return std::make_shared<CheckerboardTexture>(std::move(a), std::move(b), uvScale, uvOffset);
+}
+
+}  // namespace lobe
