@@ -1,0 +1,73 @@
+#include "scenes/primitives.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include <Eigen/Geometry>
+
+#include "scenes/world_mesh.h"
+
+namespace lobe {
+namespace {
+
+// Rotations are often written with six digits.
+constexpr float kTolerance = 1e-4f;
+
+/// Appends the square centre ± s ± t with corners of texture coordinates 0 and 1; s × t is its front.
+void addSquare(TriangleMesh& mesh, const Vec3& centre, const Vec3& s, const Vec3& t) {
+  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+  for (const Vec2& uv : {Vec2(0, 0), Vec2(1, 0), Vec2(1, 1), Vec2(0, 1)}) {
+    mesh.positions.push_back(centre + (2 * uv.x() - 1) * s + (2 * uv.y() - 1) * t);
+    mesh.normals.push_back(s.cross(t));
+    mesh.uvs.push_back(uv);
+  }
+  mesh.triangles.push_back({first, first + 1, first + 2});
+  mesh.triangles.push_back({first, first + 2, first + 3});
+}
+
+/// The faces are flat, so their own normals serve faceNormals, too, and keep the front under mirroring.
+TriangleMesh finish(TriangleMesh mesh, MeshOptions options) {
+  options.faceNormals = false;
+  return toWorldMesh(std::move(mesh), options);
+}
+
+}  // namespace
+
+TriangleMesh makeRectangle(const MeshOptions& options) {
+  TriangleMesh mesh;
+  addSquare(mesh, Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY());
+  return finish(std::move(mesh), options);
+}
+
+TriangleMesh makeCube(const MeshOptions& options) {
+  TriangleMesh mesh;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vec3 s = Vec3::Unit((axis + 1) % 3), t = Vec3::Unit((axis + 2) % 3);
+    addSquare(mesh, Vec3::Unit(axis), s, t);
+    addSquare(mesh, -Vec3::Unit(axis), t, s);
+  }
+  return finish(std::move(mesh), options);
+}
+
+Disk makeDisk(const MeshOptions& options) {
+  const Eigen::Matrix3f linear = checkedLinear(options.toWorld);
+  const Vec3 u = linear.col(0), v = linear.col(1);
+  const float square = u.squaredNorm();
+  if (!(std::abs(v.squaredNorm() - square) <= 2 * kTolerance * square && std::abs(u.dot(v)) <= kTolerance * square))
+    throw std::runtime_error("a disk's transform must keep it round");
+  const bool turned = (linear.cast<double>().determinant() < 0) != options.flipNormals;
+  return {options.toWorld.topRightCorner<3, 1>(), u, turned ? Vec3(-v) : v};
+}
+
+Sphere makeSphere(const Vec3& centre, float radius, const MeshOptions& options) {
+  if (!(radius > 0) || !std::isfinite(radius) || !centre.allFinite())
+    throw std::runtime_error("a sphere needs a finite centre and a radius above zero");
+  const Eigen::Matrix3f linear = checkedLinear(options.toWorld);
+  const Eigen::Matrix3f squares = linear.transpose() * linear;
+  const float square = squares.trace() / 3;
+  if (!((squares - square * Eigen::Matrix3f::Identity()).cwiseAbs().maxCoeff() <= 2 * kTolerance * square))
+    throw std::runtime_error("a sphere's transform must scale all directions alike");
+  return {linear * centre + options.toWorld.topRightCorner<3, 1>(), radius * std::sqrt(square), options.flipNormals};
+}
+
+}  // namespace lobe
