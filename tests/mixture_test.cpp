@@ -166,6 +166,10 @@ TEST_CASE("mixture: merging keeps weight, mean and second moments") {
 TEST_CASE("mixture: the merge cost is 0 for equals, never negative, free of scale; the printed one is not") {
   CHECK(isMergeCost(mergeCost));
   CHECK_FALSE(isMergeCost(printedCost));
+  // Two round components of half the weight each, a distance d apart: ½ log(1 + d²/(4σ²)).
+  const Gaussian a = makeGaussian(0.5f, {0.1f, 0.2f}, 0.1f, 0.1f, 0),
+                 b = makeGaussian(0.5f, {0.4f, -0.2f}, 0.1f, 0.1f, 0);
+  CHECK(mergeCost(a, b) == Approx(0.5 * std::log(1 + 0.25 / 0.04)).epsilon(1e-5));
 }
 
 TEST_CASE("mixture: reduction merges the cheapest pairs up to the threshold") {

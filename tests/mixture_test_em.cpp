@@ -191,6 +191,28 @@ TEST_CASE("mixture: on-line training comes closer to the light with every pass")
   }
 }
 
+TEST_CASE("mixture: the priors rule while points are few") {
+  // One point in a lobe of its own: whatever it says, u ≥ 8 / (1 + 8 + K v).
+  StepwiseEmOptions options;
+  StepwiseEm em(8, options);
+  em.fit(Points{{{0.3f, 0.4f}, 1}});
+  const float least = 8.0f / (1 + 8 + 8 * options.priorV);
+  CHECK(em.background() >= least);
+  CHECK(em.background() <= least + 1.0f / (1 + 8 + 8 * options.priorV));
+
+  // One component and no background but the pseudo-count's: every point belongs to the Gaussian, so all is known.
+  // Σ = b I / (a + n) and u = 8 / (n + 8 + v).
+  const int n = 4000;
+  StepwiseEm one(1, options);
+  one.fit(Points(n, {{0.3f, 0.4f}, 1}));
+  CHECK(one.background() == Approx(8.0 / (n + 8 + options.priorV)).epsilon(0.05));
+  CHECK(one.gaussians()[0].weight == 1);
+  options.minDeterminant = 1e-20f;
+  StepwiseEm narrow(1, options);
+  narrow.fit(Points(n, {{0.3f, 0.4f}, 1}));
+  CHECK(narrow.gaussians()[0].cov.xx == Approx(options.priorB / (options.priorA + n)).epsilon(0.02));
+}
+
 TEST_CASE("mixture: on-line training does not mind the order of its points") {
   const Target target{.background = 0.2f};
   Rng rng(46);

@@ -20,26 +20,21 @@ Gain gain(const Covariance& one, const Covariance& two) {
           (one.xy * syy - one.yy * sxy) * inverse, (one.yy * sxx - one.xy * sxy) * inverse};
 }
 
-// The normalised product of two components; the weight is not set. `narrow` is the one with the smaller trace: the mean
-// is a correction to its mean, Σ2 S⁻¹ μ1 + Σ1 S⁻¹ μ2 = μ1 + Σ1 S⁻¹ (μ2 − μ1), which loses no digits.
-Gaussian pairProduct(const Gaussian& narrow, const Gaussian& wide) {
-  const Gain k = gain(narrow.cov, wide.cov);
-  const double dx = static_cast<double>(wide.meanX) - narrow.meanX, dy = static_cast<double>(wide.meanY) - narrow.meanY;
-  return {1.0f, static_cast<float>(narrow.meanX + k.a * dx + k.b * dy),
-          static_cast<float>(narrow.meanY + k.c * dx + k.d * dy),
-          Covariance{static_cast<float>(k.a * wide.cov.xx + k.b * wide.cov.xy),
-                     static_cast<float>(k.a * wide.cov.xy + k.b * wide.cov.yy),
-                     static_cast<float>(k.c * wide.cov.xy + k.d * wide.cov.yy)}};
+// The normalised product of two components: μ = Σ1 S⁻¹ μ2 + Σ2 S⁻¹ μ1 = μ1 + Σ1 S⁻¹ (μ2 − μ1) and Σ = Σ1 S⁻¹ Σ2.
+Gaussian pairProduct(const Gaussian& one, const Gaussian& two) {
+  const Gain k = gain(one.cov, two.cov);
+  const double dx = static_cast<double>(two.meanX) - one.meanX, dy = static_cast<double>(two.meanY) - one.meanY;
+  return {1.0f, static_cast<float>(one.meanX + k.a * dx + k.b * dy),
+          static_cast<float>(one.meanY + k.c * dx + k.d * dy),
+          Covariance{static_cast<float>(k.a * two.cov.xx + k.b * two.cov.xy),
+                     static_cast<float>(k.a * two.cov.xy + k.b * two.cov.yy),
+                     static_cast<float>(k.c * two.cov.xy + k.d * two.cov.yy)}};
 }
 
 // a b N(μ1 − μ2 | 0, Σ1 + Σ2).
 float pairWeight(const Gaussian& one, const Gaussian& two) {
   const Covariance sum{one.cov.xx + two.cov.xx, one.cov.xy + two.cov.xy, one.cov.yy + two.cov.yy};
   return one.weight * two.weight * normalPdf({1.0f, two.meanX, two.meanY, sum}, one.mean());
-}
-
-float trace(const Covariance& c) {
-  return c.xx + c.yy;
 }
 
 }  // namespace
@@ -70,9 +65,7 @@ Vec2 Product::sample(float choice, const Vec2& u) const {
   }
   const Gaussian& two = illumination_[chosen % stride];
   if (chosen / stride == reflectance_.size()) return sampleNormal(two, u);
-  const Gaussian& one = reflectance_[chosen / stride];
-  const bool ordered = trace(one.cov) <= trace(two.cov);
-  return sampleNormal(ordered ? pairProduct(one, two) : pairProduct(two, one), u);
+  return sampleNormal(pairProduct(reflectance_[chosen / stride], two), u);
 }
 
 float Product::pdf(const Vec2& y) const {
