@@ -1,0 +1,298 @@
+#include "scenes/ply.h"
+
+#include <algorithm>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <optional>
+#include <stdexcept>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "scenes/mesh_file.h"
+#include "scenes/world_mesh.h"
+
+namespace lobe {
+namespace {
+
+enum class Format { ascii, little, big };
+enum class Type { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
+
+struct Property {
+  std::string name;
+  Type type;
+  std::optional<Type> countType;  ///< of lists only
+};
+
+struct Element {
+  std::string name;
+  std::uint64_t count;
+  std::vector<Property> properties;
+
+  int find(std::initializer_list<std::string_view> names) const {
+    for (std::size_t i = 0; i < properties.size(); ++i)
+      if (std::ranges::find(names, properties[i].name) != names.end()) return static_cast<int>(i);
+    return -1;
+  }
+};
+
+struct Header {
+  Format format;
+  std::vector<Element> elements;
+  std::size_t size;  ///< in bytes, of the header itself
+};
+
+// ---- Header
+
+std::vector<std::string_view> split(std::string_view line) {
+  std::vector<std::string_view> words;
+  while (true) {
+    line.remove_prefix(std::min(line.find_first_not_of(" \t\r"), line.size()));
+    if (line.empty()) return words;
+    words.push_back(line.substr(0, line.find_first_of(" \t\r")));
+    line.remove_prefix(words.back().size());
+  }
+}
+
+Type parseType(std::string_view name) {
+  static constexpr std::pair<std::string_view, Type> kTypes[] = {
+      {"char", Type::int8},   {"uchar", Type::uint8},   {"short", Type::int16},     {"ushort", Type::uint16},
+      {"int", Type::int32},   {"uint", Type::uint32},   {"float", Type::float32},   {"double", Type::float64},
+      {"int8", Type::int8},   {"uint8", Type::uint8},   {"int16", Type::int16},     {"uint16", Type::uint16},
+      {"int32", Type::int32}, {"uint32", Type::uint32}, {"float32", Type::float32}, {"float64", Type::float64}};
+  for (const auto& [known, type] : kTypes)
+    if (known == name) return type;
+  throw std::runtime_error(fmt::format("unknown property type \"{}\"", name));
+}
+
+Format parseFormat(std::string_view name) {
+  if (name == "ascii") return Format::ascii;
+  if (name == "binary_little_endian") return Format::little;
+  if (name == "binary_big_endian") return Format::big;
+  throw std::runtime_error(fmt::format("unknown format \"{}\"", name));
+}
+
+std::uint64_t parseCount(std::string_view text) {
+  std::uint64_t count = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
+  if (error != std::errc() || end != text.data() + text.size())
+    throw std::runtime_error(fmt::format("\"{}\" is no number of elements", text));
+  return count;
+}
+
+/// Takes one line of the header. False at its end.
+bool parseHeaderLine(std::string_view line, Header& header, bool& formatKnown) {
+  const std::vector<std::string_view> words = split(line);
+  if (words.empty() || words[0] == "comment" || words[0] == "obj_info") return true;
+  if (words[0] == "end_header") return false;
+  if (words[0] == "format" && words.size() >= 2) {
+    header.format = parseFormat(words[1]);
+    formatKnown = true;
+  } else if (words[0] == "element" && words.size() == 3) {
+    header.elements.push_back({std::string(words[1]), parseCount(words[2]), {}});
+  } else if (words[0] == "property" && words.size() == 3 && !header.elements.empty()) {
+    header.elements.back().properties.push_back({std::string(words[2]), parseType(words[1]), {}});
+  } else if (words[0] == "property" && words.size() == 5 && words[1] == "list" && !header.elements.empty()) {
+    header.elements.back().properties.push_back({std::string(words[4]), parseType(words[3]), parseType(words[2])});
+  } else {
+    throw std::runtime_error("a line of the header is not understood");
+  }
+  return true;
+}
+
+Header parseHeader(std::string_view file) {
+  if (!file.starts_with("ply") || file.size() < 4 || (file[3] != '\n' && file[3] != '\r'))
+    throw std::runtime_error("not a PLY file");
+  Header header{};
+  bool formatKnown = false;
+  std::size_t begin = file.find('\n');
+  while (begin != std::string_view::npos) {
+    const std::size_t end = file.find('\n', ++begin);
+    if (end == std::string_view::npos) break;
+    if (!parseHeaderLine(file.substr(begin, end - begin), header, formatKnown)) {
+      if (!formatKnown) throw std::runtime_error("the header does not name the format");
+      header.size = end + 1;
+      return header;
+    }
+    begin = end;
+  }
+  throw std::runtime_error("the header does not end");
+}
+
+// ---- Values
+
+/// Takes one number after the other from the file's body.
+class Values {
+ public:
+  Values(std::string_view body, Format format) : rest_(body), format_(format) {}
+
+  double next(Type type) {
+    if (format_ == Format::ascii) return nextText();
+    switch (type) {
+      case Type::int8:
+        return nextBinary<std::int8_t>();
+      case Type::uint8:
+        return nextBinary<std::uint8_t>();
+      case Type::int16:
+        return nextBinary<std::int16_t>();
+      case Type::uint16:
+        return nextBinary<std::uint16_t>();
+      case Type::int32:
+        return nextBinary<std::int32_t>();
+      case Type::uint32:
+        return nextBinary<std::uint32_t>();
+      case Type::float32:
+        return nextBinary<float>();
+      case Type::float64:
+        break;
+    }
+    return nextBinary<double>();
+  }
+
+  /// The length of a list, no more than there are bytes left.
+  std::size_t nextCount(Type type) {
+    const double count = next(type);
+    if (!(count >= 0 && count == std::floor(count))) throw std::runtime_error("a list has no proper length");
+    if (count > static_cast<double>(rest_.size())) truncated();
+    return static_cast<std::size_t>(count);
+  }
+
+  std::size_t bytesLeft() const { return rest_.size(); }
+  [[noreturn]] static void truncated() { throw std::runtime_error("the file ends too early"); }
+
+ private:
+  double nextText() {
+    rest_.remove_prefix(std::min(rest_.find_first_not_of(" \t\r\n"), rest_.size()));
+    if (rest_.empty()) truncated();
+    double value = 0;
+    if (rest_.front() == '+') rest_.remove_prefix(1);
+    const auto [end, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), value);
+    const std::size_t length = static_cast<std::size_t>(end - rest_.data());
+    const bool whole = length == rest_.size() || std::string_view(" \t\r\n").find(*end) != std::string_view::npos;
+    if (error != std::errc() || !whole)
+      throw std::runtime_error(fmt::format("\"{}\" is not a number",
+                                           rest_.substr(0, std::min<std::size_t>(rest_.find_first_of(" \t\r\n"), 40))));
+    rest_.remove_prefix(length);
+    return value;
+  }
+
+  template <class T>
+  double nextBinary() {
+    if (rest_.size() < sizeof(T)) truncated();
+    std::array<char, sizeof(T)> bytes;
+    std::memcpy(bytes.data(), rest_.data(), sizeof(T));
+    if ((format_ == Format::big) != (std::endian::native == std::endian::big)) std::ranges::reverse(bytes);
+    rest_.remove_prefix(sizeof(T));
+    return static_cast<double>(std::bit_cast<T>(bytes));
+  }
+
+  std::string_view rest_;
+  Format format_;
+};
+
+/// Reads the properties of one item: list values go to list when it is the wanted one, others to scalars.
+void readItem(const Element& element, int wantedList, Values& values, std::vector<double>& scalars,
+              std::vector<double>& list) {
+  for (std::size_t i = 0; i < element.properties.size(); ++i) {
+    const Property& property = element.properties[i];
+    if (!property.countType) {
+      scalars[i] = values.next(property.type);
+      continue;
+    }
+    const std::size_t count = values.nextCount(*property.countType);
+    const bool wanted = static_cast<int>(i) == wantedList;
+    if (wanted) list.clear();
+    for (std::size_t k = 0; k < count; ++k) {
+      const double value = values.next(property.type);
+      if (wanted) list.push_back(value);
+    }
+  }
+}
+
+/// Calls take(scalars, list) for each item of the element, scalars having one place for each property.
+template <class Take>
+void readElement(const Element& element, int wantedList, Values& values, const Take& take) {
+  // Every property takes at least a byte, so a false count ends soon; without properties it would not.
+  if (element.properties.empty()) return;
+  std::vector<double> scalars(element.properties.size()), list;
+  for (std::uint64_t i = 0; i < element.count; ++i) {
+    readItem(element, wantedList, values, scalars, list);
+    take(scalars, list);
+  }
+}
+
+// ---- Mesh
+
+/// Places of a vector's components among the properties, or nothing when one is missing.
+template <std::size_t N>
+struct Places {
+  std::array<int, N> place;
+
+  bool complete() const {
+    return std::ranges::none_of(place, [](int p) { return p < 0; });
+  }
+  Eigen::Matrix<float, N, 1> from(const std::vector<double>& scalars) const {
+    Eigen::Matrix<float, N, 1> v;
+    for (std::size_t i = 0; i < N; ++i) v[static_cast<Eigen::Index>(i)] = static_cast<float>(scalars[place[i]]);
+    return v;
+  }
+};
+
+void readVertices(const Element& element, Values& values, TriangleMesh& mesh) {
+  const auto place = [&element](std::initializer_list<std::string_view> names) {
+    const int i = element.find(names);
+    return i >= 0 && !element.properties[i].countType ? i : -1;
+  };
+  const Places<3> position{place({"x"}), place({"y"}), place({"z"})};
+  const Places<3> normal{place({"nx"}), place({"ny"}), place({"nz"})};
+  const Places<2> uv{place({"u", "s", "texture_u", "texture_s"}), place({"v", "t", "texture_v", "texture_t"})};
+  if (!position.complete()) throw std::runtime_error("the vertices have no x, y and z");
+  const bool hasNormals = normal.complete(), hasUvs = uv.complete();
+  mesh.positions.reserve(std::min<std::uint64_t>(element.count, values.bytesLeft() / 3));
+  readElement(element, -1, values, [&](const std::vector<double>& scalars, const std::vector<double>&) {
+    mesh.positions.push_back(position.from(scalars));
+    if (hasNormals) mesh.normals.push_back(normal.from(scalars));
+    if (hasUvs) mesh.uvs.push_back(uv.from(scalars));
+  });
+}
+
+void readFaces(const Element& element, Values& values, TriangleMesh& mesh) {
+  const int list = element.find({"vertex_indices", "vertex_index"});
+  if (list < 0 || !element.properties[list].countType) throw std::runtime_error("the faces have no vertex_indices");
+  readElement(element, list, values, [&mesh](const std::vector<double>&, const std::vector<double>& indices) {
+    for (const double i : indices)
+      if (!(i >= 0 && i == std::floor(i) && i < 4294967296.0))
+        throw std::runtime_error(fmt::format("a face refers to vertex {}, which cannot be", i));
+    const auto index = [&indices](std::size_t i) { return static_cast<std::uint32_t>(indices[i]); };
+    for (std::size_t i = 2; i < indices.size(); ++i) mesh.triangles.push_back({index(0), index(i - 1), index(i)});
+  });
+}
+
+TriangleMesh parsePly(std::string_view file) {
+  const Header header = parseHeader(file);
+  Values values(file.substr(header.size), header.format);
+  TriangleMesh mesh;
+  for (const Element& element : header.elements) {
+    if (element.name == "vertex")
+      readVertices(element, values, mesh);
+    else if (element.name == "face")
+      readFaces(element, values, mesh);
+    else
+      readElement(element, -1, values, [](const auto&, const auto&) {});
+  }
+  for (const auto& triangle : mesh.triangles)
+    for (const std::uint32_t i : triangle)
+      if (i >= mesh.positions.size())
+        throw std::runtime_error(fmt::format("a face refers to vertex {}, but there are {}", i, mesh.positions.size()));
+  return mesh;
+}
+
+}  // namespace
+
+TriangleMesh readPly(const std::filesystem::path& path, const MeshOptions& options) {
+  return readMeshFile(path, [&options](const std::string& file) { return toWorldMesh(parsePly(file), options); });
+}
+
+}  // namespace lobe
