@@ -7,6 +7,8 @@
 #include <span>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "runtime/mixture/gaussian.h"
 #include "runtime/mixture/product.h"
 

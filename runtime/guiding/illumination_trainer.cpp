@@ -133,10 +133,12 @@ void IlluminationTrainer::learn(std::span<const Particle> particles, std::span<c
   if (particles.empty()) return;
   const Neighbours neighbours(particles, options_.neighbours, unit_);
   updateAll(neighbours);
-  const std::size_t first = records_.size();
-  place(neighbours, requests);
-  fitFrom(first, neighbours);
-  rebuildCache();
+  makeRecords(neighbours, requests);
+}
+
+void IlluminationTrainer::fill(std::span<const Particle> particles, std::span<const RecordRequest> requests) {
+  if (particles.empty()) return;
+  makeRecords(Neighbours(particles, options_.neighbours, unit_), requests);
 }
 
 void IlluminationTrainer::updateAll(const Neighbours& neighbours) {
@@ -163,12 +165,15 @@ void IlluminationTrainer::place(const Neighbours& neighbours, std::span<const Re
   }
 }
 
-void IlluminationTrainer::fitFrom(std::size_t first, const Neighbours& neighbours) {
+void IlluminationTrainer::makeRecords(const Neighbours& neighbours, std::span<const RecordRequest> requests) {
+  const std::size_t first = records_.size();
+  place(neighbours, requests);
   tbb::parallel_for(first, records_.size(), [&](std::size_t i) {
     Training& record = records_[i];
     record.em.fit(neighbours.around(record.position, record.normal, record.tangent).points);
     shrinkRadius(record);
   });
+  rebuildCache();
 }
 
 void IlluminationTrainer::shrinkRadius(Training& record) const {

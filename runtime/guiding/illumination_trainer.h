@@ -33,6 +33,9 @@ class IlluminationTrainer {
   /// serves yet and that has particles around it.
   void learn(std::span<const Particle> particles, std::span<const RecordRequest> requests);
 
+  /// Makes records for requests that none serves from particles that the others have already learnt from.
+  void fill(std::span<const Particle> particles, std::span<const RecordRequest> requests);
+
   /// What has been learnt so far.
   const IlluminationCache& cache() const { return cache_; }
 
@@ -50,8 +53,8 @@ class IlluminationTrainer {
   class Neighbours;
 
   void updateAll(const Neighbours& neighbours);
+  void makeRecords(const Neighbours& neighbours, std::span<const RecordRequest> requests);
   void place(const Neighbours& neighbours, std::span<const RecordRequest> requests);
-  void fitFrom(std::size_t first, const Neighbours& neighbours);
   void shrinkRadius(Training& record) const;
   void rebuildCache();
 

@@ -168,22 +168,31 @@ std::optional<EmittedPhoton> Lights::areaPhoton(const AreaLight& light, float ch
   const PointSample sample = samplePoint(light, choice, u1);
   const Vec3 direction = Frame::fromNormal(sample.point.normal).toWorld(squareToCosineHemisphere(u2));
   const Rgb power = light.shape->emitter->radiance->eval(sample.point.uv) * (kPi / sample.areaDensity);
-  return EmittedPhoton{spawnRay(sample.point, direction), power, false};
+  return EmittedPhoton{spawnRay(sample.point, direction), power, false, sample.areaDensity, sample.point.normal};
 }
 
 EmittedPhoton Lights::photonFromEnvironment(const EnvironmentSample& from, const Vec2& u) const {
   const Vec2 d = squareToDisk(u) * radius_;
   const Vec3 origin = centre_ + Frame::fromNormal(from.wi).toWorld({d.x(), d.y(), radius_});
-  return {{origin, -from.wi}, from.radiance * (kPi * radius_ * radius_ / from.pdf), true};
+  const Rgb power = from.radiance * (kPi * radius_ * radius_ / from.pdf);
+  return {{origin, -from.wi}, power, true, environmentPdf(from.wi), Vec3::Zero()};
+}
+
+Vec2 Lights::photonCoordinates(const Vec3& point, const Vec3& wi) const {
+  const Vec3 local = Frame::fromNormal(wi).toLocal(point - centre_) / radius_;
+  const float azimuth = std::atan2(local.y(), local.x()) * (0.5f * kInvPi);
+  return Vec2(local.head<2>().squaredNorm(), azimuth - std::floor(azimuth)).cwiseMin(kOneMinusEpsilon);
 }
 
 std::optional<EmittedPhoton> Lights::samplePhoton(float choice, const Vec2& u1, const Vec2& u2) const {
   const std::size_t light = choice_.sample(choice);
   std::optional<EmittedPhoton> photon;
-  if (light < areas_.size())
+  if (light < areas_.size()) {
     photon = areaPhoton(areas_[light], choice, u1, u2);
-  else if (const std::optional<EnvironmentSample> from = environment_->sample(u1))
+    photon->emitterDensity *= choice_.probability(light);
+  } else if (const std::optional<EnvironmentSample> from = environment_->sample(u1)) {
     photon = photonFromEnvironment(*from, u2);
+  }
   if (photon) photon->power /= choice_.probability(light);
   return photon;
 }

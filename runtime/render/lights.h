@@ -24,6 +24,10 @@ struct EmittedPhoton {
   Ray ray;
   Rgb power;         ///< flux over the density of choosing light, point and direction
   bool environment;  ///< it came from infinitely far: ray.origin is only a start outside the scene
+  /// How densely Lights::sample would choose where it came from, with the choice of the light: over solid angle for the
+  /// environment, over area for surfaces.
+  float emitterDensity;
+  Vec3 normal;  ///< of the surface it left
 };
 
 class Lights {
@@ -55,6 +59,9 @@ class Lights {
   /// A photon that arrives from a direction sampled elsewhere (a learnt density, say), as samplePhoton makes them; its
   /// power does not contain the probability of choosing the environment.
   EmittedPhoton photonFromEnvironment(const EnvironmentSample& from, const Vec2& u) const;
+
+  /// The u for which photonFromEnvironment makes the photon that travels along −wi through the point (of the scene).
+  Vec2 photonCoordinates(const Vec3& point, const Vec3& wi) const;
 
   /// Emitted flux of all lights, luminance (environment: what enters the bounding sphere).
   double totalPower() const { return choice_.total(); }

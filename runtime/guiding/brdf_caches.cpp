@@ -1,0 +1,93 @@
+#include "runtime/guiding/brdf_caches.h"
+
+#include <map>
+#include <numbers>
+#include <stdexcept>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "runtime/mixture/lookup.h"
+
+namespace lobe {
+namespace {
+
+// A cache's components are read in place as Gaussians.
+static_assert(sizeof(CacheComponent) == sizeof(Gaussian) && alignof(CacheComponent) == alignof(Gaussian));
+
+std::span<const Gaussian> asGaussians(std::span<const CacheComponent> components) {
+  return {reinterpret_cast<const Gaussian*>(components.data()), components.size()};
+}
+
+/// Opens the file of a lobe, or says why it cannot serve.
+LobeCache openFor(const std::filesystem::path& folder, const LobeRequest& request) {
+  const std::filesystem::path path = folder / lobeFileName(request.model, request.key);
+  if (!std::filesystem::exists(path)) throw std::runtime_error(path.string() + ": missing");
+  LobeCache cache = LobeCache::open(path);
+  if (cache.info().key != request.key || cache.info().modelRevision != request.revision)
+    throw std::runtime_error(path.string() + ": stale, it was fitted for another version of the lobe");
+  return cache;
+}
+
+}  // namespace
+
+BrdfCaches::BrdfCaches(const std::filesystem::path& folder, std::span<const LobeRequest> requests,
+                       const std::string& remedy) {
+  std::map<std::string, int> known;
+  std::map<std::string, std::vector<std::string>> faults;  // by message, the materials
+  for (const LobeRequest& request : requests) {
+    auto [entry, added] = known.try_emplace(request.key, static_cast<int>(caches_.size()));
+    cacheOfRequest_.push_back(entry->second);
+    if (!added) continue;
+    try {
+      LobeCache cache = openFor(folder, request);
+      const DirectionGrid grid{static_cast<GridKind>(cache.info().gridKind), static_cast<int>(cache.info().gridCount)};
+      caches_.push_back({std::move(cache), grid});
+    } catch (const std::runtime_error& e) {
+      faults[e.what()].push_back(request.material);
+      known.erase(entry);  // so that the next material of the same lobe is named, too
+    }
+  }
+  if (faults.empty()) return;
+  std::vector<std::string> lines;
+  for (const auto& [message, materials] : faults)
+    lines.push_back(fmt::format("{} (material {})", message, fmt::join(materials, ", ")));
+  throw std::runtime_error(fmt::format("BRDF caches: {}; run: {}", fmt::join(lines, "; "), remedy));
+}
+
+void BrdfCaches::add(int lobe, const Vec3& wo, const Vec2& turn, float tint, Reflectance& reflectance) const {
+  const Entry& entry = caches_[cacheOfRequest_[lobe]];
+  const bool isotropic = entry.grid.kind == GridKind::elevation;
+  const auto turned = [&](const Vec3& w) {
+    return Vec3(turn.x() * w.x() - turn.y() * w.y(), turn.y() * w.x() + turn.x() * w.y(), w.z());
+  };
+  // An isotropic lobe can be looked up in the frame wanted; an anisotropic one knows its tangent and is turned after.
+  const Vec3 query = isotropic ? turned(wo) : wo;
+  const int index = entry.grid.nearest(query);
+  const CacheRecord& record = entry.cache.records()[index];
+  const std::span<const Gaussian> fitted = asGaussians(entry.cache.components(record));
+  const std::span<Gaussian> room = std::span(reflectance.components).subspan(reflectance.count);
+  if (fitted.size() > room.size()) return;
+
+  const float scale = 0.5f * tint * record.integral;  // ρ = integral · G / 2, because dω = 2 dA
+  for (Gaussian& g : alignMixture(entry.grid, index, fitted, query, room)) {
+    if (!isotropic) g = rotated(g, turn);
+    g.weight *= scale;
+  }
+  reflectance.count += static_cast<int>(fitted.size());
+  reflectance.backgroundMass += scale * 2.0f * std::numbers::inv_pi_v<float> * record.cosineMass;
+}
+
+std::size_t BrdfCaches::bytes() const {
+  std::size_t sum = 0;
+  for (const Entry& e : caches_) sum += e.cache.bytes();
+  return sum;
+}
+
+std::vector<std::uint64_t> BrdfCaches::hashes() const {
+  std::vector<std::uint64_t> all;
+  for (const Entry& e : caches_) all.push_back(e.cache.hash());
+  return all;
+}
+
+}  // namespace lobe

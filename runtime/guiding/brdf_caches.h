@@ -1,0 +1,48 @@
+#pragma once
+// The BRDF caches of a scene, opened once and looked up at every vertex.
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "runtime/guiding/reflectance.h"
+#include "runtime/mixture/grid.h"
+#include "schema/lobe_cache.h"
+
+namespace lobe {
+
+/// A lobe that some material has, and so a cache file that is needed.
+struct LobeRequest {
+  std::string model, key;  ///< as the lobe says
+  int revision;
+  std::string material;  ///< for messages
+};
+
+class BrdfCaches {
+ public:
+  /// Opens the file of every request in the folder; equal keys share one. Throws std::runtime_error with one line that
+  /// names all materials whose cache is missing, stale or damaged, and `remedy`, the command that makes them.
+  BrdfCaches(const std::filesystem::path& folder, std::span<const LobeRequest> requests, const std::string& remedy);
+
+  /// Adds tint · ρ_lobe at wo to a reflectance. lobe: index of the request. wo: unit, z > 0, in the shading frame.
+  /// turn: (cos, sin) of the angle by which the reflectance's frame sees shading-frame vectors turned about the normal.
+  /// A lobe whose components do not fit any more is left out: it is then sampled by the BSDF only.
+  void add(int lobe, const Vec3& wo, const Vec2& turn, float tint, Reflectance& reflectance) const;
+
+  std::size_t files() const { return caches_.size(); }
+  std::size_t bytes() const;
+  /// Content hashes of the files, in order of first use.
+  std::vector<std::uint64_t> hashes() const;
+
+ private:
+  struct Entry {
+    LobeCache cache;
+    DirectionGrid grid;
+  };
+  std::vector<Entry> caches_;
+  std::vector<int> cacheOfRequest_;
+};
+
+}  // namespace lobe

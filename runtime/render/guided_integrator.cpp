@@ -1,0 +1,103 @@
+#include "runtime/render/guided_integrator.h"
+
+namespace lobe {
+namespace {
+
+SamplingStrategy asCounted(Strategy strategy) {
+  switch (strategy) {
+    case Strategy::product:
+      return SamplingStrategy::product;
+    case Strategy::illumination:
+      return SamplingStrategy::illumination;
+    default:
+      return SamplingStrategy::bsdf;
+  }
+}
+
+/// The frame in which both factors of the product are given, as seen from the shading frame: z is the shading normal on
+/// the side of wo, x the record's tangent made orthogonal to it. So records need no turning on flat surfaces.
+Eigen::Matrix3f guideAxes(const SurfaceHit& hit, const IlluminationRecord& record, float side) {
+  const Vec3 tangent = hit.frame.toLocal(record.tangent);
+  const float length = tangent.head<2>().norm();
+  const Vec2 x = length > 1e-4f ? Vec2(tangent.head<2>() / length) : Vec2(Vec2::UnitX());
+  Eigen::Matrix3f axes;
+  axes << x.x(), x.y(), 0, -side * x.y(), side * x.x(), 0, 0, 0, side;
+  return axes;
+}
+
+}  // namespace
+
+std::vector<LobeRequest> lobeRequests(const Scene& scene) {
+  std::vector<LobeRequest> requests;
+  for (const Material& material : scene.materials)
+    for (const LobePtr& lobe : material.bsdf->lobes())
+      requests.push_back({lobe->model(), lobe->key(), lobe->revision(), material.name});
+  return requests;
+}
+
+GuidedSampler::GuidedSampler(const Scene& scene, const IlluminationCache& illumination, const BrdfCaches* caches)
+    : scene_(scene), illumination_(illumination), caches_(caches) {
+  int next = 0;
+  for (const Material& material : scene.materials) {
+    firstRequest_.push_back(next);
+    next += static_cast<int>(material.bsdf->lobes().size());
+  }
+}
+
+GuidedSampler::Vertex::Vertex(const GuidedSampler& sampler, const SurfaceHit& hit) : hit_(hit) {
+  const float side = hit.wo.z() >= 0 ? 1.0f : -1.0f;
+  const IlluminationRecord* record = sampler.illumination_.find(hit.position, side * hit.normal);
+  if (!record) return;
+  axes_ = guideAxes(hit, *record, side);
+  if (!sampler.caches_) {
+    density_.emplace(reflectance_, *record, kGuidedShares);
+    return;
+  }
+  collectReflectance(sampler, hit, side);
+  density_.emplace(reflectance_, *record,
+                   record->samples < kUncertainSamples ? kUncertainProductShares : kProductShares);
+}
+
+void GuidedSampler::Vertex::collectReflectance(const GuidedSampler& sampler, const SurfaceHit& hit, float side) {
+  const LobeMixture mixture = hit.bsdf->mixture(hit.wo, hit.uv);
+  reflectance_.constant = mixture.constant * kInvPi;
+  reflectance_.backgroundMass = reflectance_.constant;
+  // On the back, lobes see the frame (s, −t, −n). The lobes we have are symmetric in t, so that this is theirs as well
+  // as the mirrored (s, t, −n) of two-sided materials; for another lobe the density would be worse, not wrong.
+  const Vec3 wo(hit.wo.x(), side * hit.wo.y(), side * hit.wo.z());
+  const Vec2 turn(axes_(0, 0), axes_(1, 0));
+  const int first = sampler.firstRequest_[sampler.scene_.shapes[hit.shape].material];
+  for (int i = 0; i < mixture.glossyCount; ++i)
+    if (mixture.glossy[i].tint > 0)
+      sampler.caches_->add(first + mixture.glossy[i].lobe, wo, turn, mixture.glossy[i].tint, reflectance_);
+}
+
+std::optional<BsdfSample> GuidedSampler::Vertex::sample(Rng& rng, PathStatistics& statistics) const {
+  float choice = rng.uniform();
+  const Vec2 u = rng.uniform2();
+  const Strategy strategy = density_ ? density_->choose(choice) : Strategy::bsdf;
+  statistics.count(asCounted(strategy));
+  if (strategy == Strategy::bsdf) {
+    std::optional<BsdfSample> sample = hit_.bsdf->sample(hit_.wo, hit_.uv, choice, u);
+    if (sample && density_)
+      sample->pdf = density_->bsdfShare() * sample->pdf + density_->guidedPdf(toGuide(sample->wi));
+    return sample;
+  }
+  const std::optional<Vec3> guide = density_->sample(strategy, choice, u);
+  if (!guide) return std::nullopt;
+  const Vec3 wi = axes_.transpose() * *guide;
+  const Rgb f = hit_.bsdf->eval(hit_.wo, wi, hit_.uv);
+  if (!(f.maxCoeff() > 0)) return std::nullopt;
+  return BsdfSample{wi, f, density_->bsdfShare() * hit_.bsdf->pdf(hit_.wo, wi, hit_.uv) + density_->guidedPdf(*guide)};
+}
+
+float GuidedSampler::Vertex::pdf(const Vec3& wi) const {
+  const float bsdf = hit_.bsdf->pdf(hit_.wo, wi, hit_.uv);
+  return density_ ? density_->bsdfShare() * bsdf + density_->guidedPdf(toGuide(wi)) : bsdf;
+}
+
+Rgb GuidedIntegrator::radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const {
+  return PathLoop(scene_, options_, sampler_).radiance(ray, rng, statistics);
+}
+
+}  // namespace lobe

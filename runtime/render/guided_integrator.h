@@ -1,0 +1,62 @@
+#pragma once
+// Path tracing that samples directions by what was learnt: the illumination mixture and the BSDF half and half
+// (`guided`, Vorba et al. 2014), or with their product besides (`product`, Herholz et al. 2016).
+
+#include <optional>
+
+#include "runtime/guiding/brdf_caches.h"
+#include "runtime/guiding/guided_density.h"
+#include "runtime/render/path_loop.h"
+
+namespace lobe {
+
+/// One request for each lobe of each material, material by material.
+std::vector<LobeRequest> lobeRequests(const Scene& scene);
+
+class GuidedSampler {
+ public:
+  /// All outlive it. caches: opened for lobeRequests(scene); nullptr: illumination and BSDF only (`guided`).
+  GuidedSampler(const Scene& scene, const IlluminationCache& illumination, const BrdfCaches* caches);
+
+  class Vertex {
+   public:
+    Vertex(const GuidedSampler& sampler, const SurfaceHit& hit);
+    Vertex(const Vertex&) = delete;
+    Vertex& operator=(const Vertex&) = delete;
+
+    std::optional<BsdfSample> sample(Rng& rng, PathStatistics& statistics) const;
+    float pdf(const Vec3& wi) const;
+    /// Whether there is a record for this point.
+    bool guided() const { return density_.has_value(); }
+
+   private:
+    void collectReflectance(const GuidedSampler& sampler, const SurfaceHit& hit, float side);
+    Vec3 toGuide(const Vec3& wi) const { return axes_ * wi; }
+
+    const SurfaceHit& hit_;
+    Reflectance reflectance_;
+    Eigen::Matrix3f axes_;  // from the shading frame to the guide's
+    std::optional<GuidedDensity> density_;
+  };
+
+ private:
+  const Scene& scene_;
+  const IlluminationCache& illumination_;
+  const BrdfCaches* caches_;
+  std::vector<int> firstRequest_;  // by material
+};
+
+class GuidedIntegrator : public Integrator {
+ public:
+  /// Scene and sampler outlive it.
+  GuidedIntegrator(const RenderScene& scene, const PathOptions& options, const GuidedSampler& sampler)
+      : scene_(scene), options_(options), sampler_(sampler) {}
+  Rgb radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const override;
+
+ private:
+  const RenderScene& scene_;
+  PathOptions options_;
+  const GuidedSampler& sampler_;
+};
+
+}  // namespace lobe

@@ -1,0 +1,75 @@
+// loberender: trains the illumination of a scene and renders it.
+
+#include <oneapi/tbb/global_control.h>
+
+#include "runtime/render/render_job.h"
+#include "scenes/tool.h"
+
+namespace {
+
+using namespace lobe;
+
+/// "WxH" to two numbers.
+std::pair<int, int> parseSize(const std::string& text) {
+  int width = 0, height = 0, end = 0;
+  if (std::sscanf(text.c_str(), "%dx%d%n", &width, &height, &end) != 2 || end != static_cast<int>(text.size()))
+    throw UsageError("--size: '" + text + "' is not WIDTHxHEIGHT");
+  return {width, height};
+}
+
+struct Options {
+  RenderJob job;
+  std::string size;
+  int threads = 0;
+};
+
+void declareTraining(CLI::App& app, RenderJob& job) {
+  TrainingPlan& plan = job.training;
+  app.add_option("--passes", plan.passes, "Training passes")->capture_default_str();
+  app.add_option("--photons", plan.photons, "Photons a pass")->capture_default_str();
+  app.add_option("--importons", plan.importons, "Importons a pass")->capture_default_str();
+  app.add_option("--components", plan.records.components, "Gaussians of an illumination record, 1 to 8")
+      ->capture_default_str();
+  app.add_option("--training-share", job.trainingShare, "With --seconds: the share of them after which no pass starts")
+      ->capture_default_str();
+}
+
+void declare(CLI::App& app, Options& options) {
+  RenderJob& job = options.job;
+  app.add_option("scene", job.scene, "Mitsuba scene file (XML)")->required();
+  app.add_option("-o,--output", job.outputs, "Picture, .exr or .png; may be given several times")->required();
+  app.add_option("--cache", job.cacheFolder, "Folder of the caches that lobefit made")->capture_default_str();
+  const std::map<std::string, IntegratorKind> kinds{
+      {"path", IntegratorKind::path}, {"guided", IntegratorKind::guided}, {"product", IntegratorKind::product}};
+  app.add_option("--integrator", job.integrator, "path, guided or product")
+      ->transform(CLI::CheckedTransformer(kinds))
+      ->default_str("product");
+  app.add_option("--spp", job.samples, "Samples per pixel");
+  app.add_option("--seconds", job.seconds, "Seconds of training and rendering, instead of --spp");
+  app.add_option("--size", options.size, "WIDTHxHEIGHT in pixels, instead of the scene's");
+  app.add_option("--max-depth", job.maxDepth, "Longest path in segments (default: no limit)");
+  app.add_option("--seed", job.seed, "Random seed")->capture_default_str();
+  app.add_option("--reference", job.reference, "Picture to measure the error against while rendering");
+  app.add_option("--convergence", job.convergence, "CSV of that error over time");
+  app.add_option("--stats", job.stats, "JSON file for the run's statistics");
+  app.add_flag("--lenient", job.lenient, "Pass over what the reader does not know, with warnings");
+  declareTraining(app, job);
+  addDefinitions(app, job.definitions);
+  addThreads(app, options.threads);
+}
+
+void work(Options& options) {
+  if (!options.size.empty()) options.job.size = parseSize(options.size);
+  std::optional<oneapi::tbb::global_control> limit;
+  if (options.threads > 0) limit.emplace(oneapi::tbb::global_control::max_allowed_parallelism, options.threads);
+  run(options.job);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  return runTool(
+      "loberender", "Trains the illumination of a scene and renders it.", argc, argv,
+      [&](CLI::App& app) { declare(app, options); }, [&] { work(options); });
+}

@@ -1,0 +1,224 @@
+#include "runtime/render/render_job.h"
+
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <stdexcept>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <sys/resource.h>
+
+#include <nlohmann/json.hpp>
+
+#include "runtime/render/error_metrics.h"
+#include "runtime/render/image_output.h"
+#include "runtime/render/path_integrator.h"
+#include "runtime/render/renderer.h"
+#include "scenes/camera.h"
+#include "scenes/reader.h"
+#include "scenes/tool.h"
+#include "schema/atomic_file.h"
+
+namespace lobe {
+namespace {
+
+constexpr const char* kTool = "loberender";
+
+const char* nameOf(IntegratorKind kind) {
+  constexpr std::array names{"path", "guided", "product"};
+  return names[static_cast<std::size_t>(kind)];
+}
+
+double peakResidentBytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return 1024.0 * static_cast<double>(usage.ru_maxrss);
+}
+
+Scene readFor(const RenderJob& job) {
+  Scene scene = readScene(job.scene, {job.definitions, job.lenient});
+  for (const std::string& warning : scene.warnings) printWarning(kTool, warning);
+  if (job.size) {
+    scene.camera.width = job.size->first;
+    scene.camera.height = job.size->second;
+    scene.camera.horizontalFov = horizontalFov(scene.camera, scene.camera.width, scene.camera.height);
+  }
+  return scene;
+}
+
+/// Error against time, a line a wave.
+class ConvergenceLog {
+ public:
+  explicit ConvergenceLog(const RenderJob& job, const Scene& scene) : file_(job.convergence) {
+    if (job.reference.empty()) return;
+    reference_ = readImage(job.reference);
+    if (reference_->width != scene.camera.width || reference_->height != scene.camera.height)
+      throw std::runtime_error(fmt::format("{}: the reference has {}x{} pixels, the picture {}x{}; use --size {}x{}",
+                                           job.reference.string(), reference_->width, reference_->height,
+                                           scene.camera.width, scene.camera.height, reference_->width,
+                                           reference_->height));
+  }
+
+  void add(const Film& film, double seconds, int samples) {
+    if (!reference_) return;
+    const ErrorMetrics e = compareImages(*reference_, film.mean());
+    text_ += fmt::format("{:.3f},{},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g}\n", seconds, samples, e.mse, e.relmse,
+                         e.relmseDrop01, e.relmseDrop1, e.meanRatio);
+  }
+
+  void write() const {
+    if (reference_)
+      writeAtomically(file_, "seconds,spp,mse,relmse,relmse_drop_0.1pct,relmse_drop_1pct,mean_ratio\n" + text_);
+  }
+
+ private:
+  std::filesystem::path file_;
+  std::optional<Image> reference_;
+  std::string text_;
+};
+
+/// What a run leaves besides the picture.
+struct RunResult {
+  RenderResult render;
+  TrainedIllumination training;
+  std::size_t lobeBytes = 0;
+  std::vector<std::uint64_t> cacheHashes;
+  std::uint64_t dropped = 0;
+};
+
+nlohmann::ordered_json statistics(const RenderJob& job, const RunResult& run) {
+  const PathStatistics& paths = run.render.statistics;
+  const RenderProgress& total = run.render.total;
+  nlohmann::ordered_json shares;
+  std::uint64_t decisions = 0;
+  for (const std::uint64_t n : paths.strategies) decisions += n;
+  for (std::size_t i = 0; i < kSamplingStrategyNames.size(); ++i)
+    shares[kSamplingStrategyNames[i]] =
+        decisions > 0 ? static_cast<double>(paths.strategies[i]) / static_cast<double>(decisions) : 0.0;
+  return {{"integrator", nameOf(job.integrator)},
+          {"seed", job.seed},
+          {"seconds_total", run.training.report.seconds + total.seconds},
+          {"seconds_training", run.training.report.seconds},
+          {"seconds_rendering", total.seconds},
+          {"spp", total.samples},
+          {"rays", paths.rays()},
+          {"path_segments", paths.segments},
+          {"segments_per_second", static_cast<double>(paths.segments) / total.seconds},
+          {"mean_path_length", static_cast<double>(paths.segments) / static_cast<double>(paths.paths)},
+          {"peak_rss_bytes", peakResidentBytes()},
+          {"training_passes", run.training.report.passes},
+          {"training_particles", run.training.report.particles},
+          {"records", run.training.cache.records().size()},
+          {"records_undersampled_share", run.training.report.undersampledShare},
+          {"record_bytes", run.training.cache.bytes()},
+          {"lobe_bytes", run.lobeBytes},
+          {"strategy_shares", shares},
+          {"nonfinite_samples", run.dropped}};
+}
+
+ImageAttributes attributes(const RenderJob& job, const RunResult& run) {
+  ImageAttributes all{{"software", fmt::format("Lobe {}", LOBE_VERSION)},
+                      {"integrator", std::string(nameOf(job.integrator))},
+                      {"seed", static_cast<double>(job.seed)},
+                      {"samples", static_cast<double>(run.render.total.samples)},
+                      {"cacheHashes", fmt::format("{:016x}", fmt::join(run.cacheHashes, " "))}};
+  // A picture of so many samples is the same bytes on every run; one of so many seconds never is.
+  if (job.seconds) all["seconds"] = run.training.report.seconds + run.render.total.seconds;
+  return all;
+}
+
+/// The caches and what was learnt, or neither for `path`.
+struct Guiding {
+  std::optional<BrdfCaches> caches;
+  TrainedIllumination training;
+  std::optional<GuidedSampler> sampler;
+};
+
+void prepare(const RenderJob& job, const RenderScene& scene, const PinholeCamera& camera, Guiding& guiding) {
+  if (job.integrator == IntegratorKind::path) return;
+  TrainingPlan plan = job.training;
+  plan.seed = job.seed;
+  if (job.seconds) plan.seconds = job.trainingShare * *job.seconds;
+  const BrdfCaches* caches = guiding.caches ? &*guiding.caches : nullptr;
+  Progress progress("training", plan.passes);
+  guiding.training = trainIllumination(scene, camera, caches, plan, [&](int) { progress.advance(); });
+  guiding.sampler.emplace(scene.scene, guiding.training.cache, caches);
+}
+
+std::unique_ptr<Integrator> makeIntegrator(const RenderJob& job, const RenderScene& scene, const Guiding& guiding) {
+  PathOptions options;
+  if (job.maxDepth) options.maxDepth = *job.maxDepth;
+  if (!guiding.sampler) return std::make_unique<PathIntegrator>(scene, options);
+  return std::make_unique<GuidedIntegrator>(scene, options, *guiding.sampler);
+}
+
+RenderOptions renderOptions(const RenderJob& job, double trained) {
+  RenderOptions options{job.seed, job.samples, std::nullopt};
+  if (job.seconds) options.seconds = std::max(*job.seconds - trained, 1e-3);
+  return options;
+}
+
+}  // namespace
+
+void RenderJob::validate() const {
+  const auto require = [](bool condition, const std::string& message) {
+    if (!condition) throw UsageError(message);
+  };
+  require(samples.has_value() != seconds.has_value(), "either --spp or --seconds has to be given");
+  require(!samples || *samples >= 1, "--spp has to be at least 1");
+  require(!seconds || *seconds > 0, "--seconds has to be over 0");
+  require(!size || (size->first >= 1 && size->second >= 1), "--size has to be at least 1x1");
+  require(!maxDepth || *maxDepth >= 1, "--max-depth has to be at least 1");
+  require(trainingShare > 0 && trainingShare < 1, "--training-share has to be between 0 and 1");
+  require(reference.empty() == convergence.empty(), "--reference and --convergence go together");
+  require(!outputs.empty(), "-o is missing");
+  training.validate();
+  for (const auto& output : outputs) checkImageName(output);
+}
+
+std::string lobefitCommand(const RenderJob& job) {
+  std::string command = fmt::format("lobefit {} -o {}", job.scene.string(), job.cacheFolder.string());
+  for (const auto& [name, value] : job.definitions) command += fmt::format(" -D {}={}", name, value);
+  return command;
+}
+
+void run(const RenderJob& job) {
+  job.validate();
+  const Scene scene = readFor(job);
+  ConvergenceLog log(job, scene);
+  Guiding guiding;
+  if (job.integrator == IntegratorKind::product)
+    guiding.caches.emplace(job.cacheFolder, lobeRequests(scene), lobefitCommand(job));
+  const RenderScene renderScene(scene);
+  const PinholeCamera camera(scene.camera, scene.filter);
+  prepare(job, renderScene, camera, guiding);
+
+  RunResult result;
+  result.training = std::move(guiding.training);
+  const std::unique_ptr<Integrator> integrator = makeIntegrator(job, renderScene, guiding);
+  const double trained = result.training.report.seconds;
+  Film film(camera.width(), camera.height());
+  {
+    Progress progress("rendering", job.samples ? *job.samples : *job.seconds - trained);
+    double done = 0;
+    result.render = render(camera, *integrator, film, renderOptions(job, trained), [&](const RenderProgress& p) {
+      const double now = job.samples ? p.samples : p.seconds;
+      progress.advance(now - done);
+      done = now;
+      log.add(film, trained + p.seconds, p.samples);
+    });
+  }
+  result.dropped = film.dropped();
+  if (result.dropped > 0) printWarning(kTool, fmt::format("{} samples were not finite and left out", result.dropped));
+  if (guiding.caches) {
+    result.lobeBytes = guiding.caches->bytes();
+    result.cacheHashes = guiding.caches->hashes();
+  }
+  for (const auto& output : job.outputs) writeImage(output, film.mean(), attributes(job, result));
+  log.write();
+  if (!job.stats.empty()) writeAtomically(job.stats, statistics(job, result).dump(2) + "\n");
+}
+
+}  // namespace lobe

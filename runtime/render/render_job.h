@@ -1,0 +1,46 @@
+#pragma once
+// What loberender does, from options to files.
+
+#include <cstddef>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "materials/image.h"
+#include "runtime/render/training.h"
+
+namespace lobe {
+
+enum class IntegratorKind { path, guided, product };
+
+struct RenderJob {
+  std::filesystem::path scene;
+  std::map<std::string, std::string> definitions;
+  bool lenient = false;
+  std::filesystem::path cacheFolder = "lobes";
+  std::vector<std::filesystem::path> outputs;
+
+  IntegratorKind integrator = IntegratorKind::product;
+  std::optional<int> samples;     ///< per pixel; or
+  std::optional<double> seconds;  ///< of training and rendering together
+  std::optional<std::pair<int, int>> size;
+  std::optional<int> maxDepth;  ///< segments
+  std::uint64_t seed = 1;
+  TrainingPlan training;
+  double trainingShare = 0.25;  ///< of seconds, at most
+
+  std::filesystem::path reference, convergence, stats;  ///< empty: not wanted
+
+  /// Throws std::runtime_error that names the option.
+  void validate() const;
+};
+
+/// The command that makes the caches a job needs, for messages.
+std::string lobefitCommand(const RenderJob& job);
+
+/// Reads, trains, renders and writes all outputs; talk goes to stderr. Throws std::runtime_error.
+void run(const RenderJob& job);
+
+}  // namespace lobe

@@ -1,0 +1,39 @@
+#pragma once
+// Trains the illumination of a scene, pass by pass.
+
+#include <functional>
+
+#include "runtime/guiding/illumination_trainer.h"
+#include "runtime/render/particle_tracer.h"
+
+namespace lobe {
+
+struct TrainingPlan {
+  int passes = 8;
+  int photons = 100000;        ///< a pass
+  int importons = 50000;       ///< a pass
+  double seconds = kInfinity;  ///< no pass starts after that; the result then depends on the machine's speed
+  std::uint64_t seed = 1;
+  TrainingOptions records;
+
+  /// Throws std::runtime_error that names the field.
+  void validate() const;
+};
+
+struct TrainingReport {
+  int passes = 0;
+  std::uint64_t particles = 0;
+  double seconds = 0;
+  double undersampledShare = 0;
+};
+
+struct TrainedIllumination {
+  IlluminationCache cache;
+  TrainingReport report;
+};
+
+/// caches: for the product; nullptr: paths in training are guided by illumination only. afterPass: passes done so far.
+TrainedIllumination trainIllumination(const RenderScene& scene, const PinholeCamera& camera, const BrdfCaches* caches,
+                                      const TrainingPlan& plan, const std::function<void(int)>& afterPass = {});
+
+}  // namespace lobe
