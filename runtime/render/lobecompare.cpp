@@ -1,0 +1,99 @@
+// lobecompare: how far images are from a reference.
+
+#include <cstdio>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "runtime/render/error_map.h"
+#include "runtime/render/error_metrics.h"
+#include "runtime/render/image_output.h"
+#include "scenes/tool.h"
+
+namespace {
+
+struct Arguments {
+  std::string reference;
+  std::vector<std::string> images;
+  bool json = false;
+  std::string map;
+};
+
+struct Comparison {
+  std::string image;
+  lobe::ErrorMetrics metrics;
+};
+
+void declare(CLI::App& app, Arguments& arguments) {
+  app.add_option("REFERENCE", arguments.reference, "The image to compare with")->required();
+  app.add_option("IMAGE", arguments.images, "Images of the same size")->required();
+  app.add_flag("--json", arguments.json, "Print an array of objects instead of a table");
+  app.add_option("--map", arguments.map,
+                 fmt::format("Write the relative error of each pixel of the one image as a PNG, from {:g} (black) over "
+                             "blue, red and yellow to {:g} (white)",
+                             lobe::kMapLow, lobe::kMapHigh));
+}
+
+void checkArguments(const Arguments& arguments) {
+  if (arguments.map.empty()) return;
+  if (arguments.images.size() > 1) throw lobe::UsageError("--map shows one image, but several are given");
+  if (std::filesystem::path(arguments.map).extension() != ".png") throw lobe::UsageError("--map is written as .png");
+}
+
+Comparison compare(const lobe::Image& reference, const std::string& name, const std::string& map) {
+  const lobe::Image image = lobe::readImage(name);
+  try {
+    Comparison result{name, lobe::compareImages(reference, image)};
+    if (!map.empty()) lobe::writeErrorMap(map, reference, image);
+    return result;
+  } catch (const std::runtime_error& e) {
+    throw std::runtime_error(fmt::format("{}: {}", name, e.what()));
+  }
+}
+
+void printJson(const std::vector<Comparison>& comparisons) {
+  nlohmann::ordered_json array = nlohmann::ordered_json::array();
+  for (const auto& [image, m] : comparisons)
+    array.push_back({{"image", image},
+                     {"mse", m.mse},
+                     {"relmse", m.relmse},
+                     {"relmse_drop_0.1pct", m.relmseDrop01},
+                     {"relmse_drop_1pct", m.relmseDrop1},
+                     {"mean_ratio", m.meanRatio},
+                     {"nonfinite", m.nonfinite}});
+  fmt::print("{}\n", array.dump(2));
+}
+
+void printTable(const std::vector<Comparison>& comparisons) {
+  lobe::Table table(
+      {"image", "mse", "relmse", "without worst 0.1 %", "without worst 1 %", "ratio of means", "non-finite"});
+  for (const auto& [image, m] : comparisons)
+    table.add({image, fmt::format("{:.6g}", m.mse), fmt::format("{:.6g}", m.relmse),
+               fmt::format("{:.6g}", m.relmseDrop01), fmt::format("{:.6g}", m.relmseDrop1),
+               fmt::format("{:.5f}", m.meanRatio), fmt::format("{}", m.nonfinite)});
+  table.print(stdout);
+}
+
+void run(const Arguments& arguments) {
+  checkArguments(arguments);
+  const lobe::Image reference = lobe::readImage(arguments.reference);
+  std::vector<Comparison> comparisons;
+  for (const std::string& name : arguments.images) comparisons.push_back(compare(reference, name, arguments.map));
+  if (arguments.json)
+    printJson(comparisons);
+  else
+    printTable(comparisons);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Arguments arguments;
+  return lobe::runTool(
+      "lobecompare", "Errors of images against a reference, as numbers and as a map.", argc, argv,
+      [&](CLI::App& app) { declare(app, arguments); }, [&] { run(arguments); });
+}

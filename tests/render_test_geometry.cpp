@@ -1,0 +1,256 @@
+// Ray tracing, hits, cameras.
+
+#include "render_test_tools.h"
+#include "runtime/render/camera.h"
+
+using namespace lobe;
+using namespace lobe::test;
+
+namespace {
+
+Vec3 randomDirection(Rng& rng) {
+  return squareToSphere(rng.uniform2());
+}
+
+// A direction on the given side of a normal.
+Vec3 randomDirection(Rng& rng, const Vec3& side) {
+  const Vec3 d = randomDirection(rng);
+  return d.dot(side) < 0 ? Vec3(-d) : d;
+}
+
+// A mesh of a sphere: triangles at all angles.
+TriangleMesh sphereMesh(const Vec3& centre, float radius, int rings) {
+  TriangleMesh mesh;
+  for (int i = 0; i <= rings; ++i)
+    for (int j = 0; j <= 2 * rings; ++j) {
+      const float theta = kPi * i / rings, phi = kPi * j / rings;
+      const Vec3 n(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta));
+      mesh.positions.push_back(centre + radius * n);
+      mesh.normals.push_back(n);
+    }
+  const auto stride = static_cast<std::uint32_t>(2 * rings + 1);
+  for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(rings); ++i)
+    for (std::uint32_t j = 0; j + 1 < stride; ++j) {
+      const std::uint32_t a = i * stride + j, b = a + stride;
+      mesh.triangles.push_back({a, b, b + 1});
+      mesh.triangles.push_back({a, b + 1, a + 1});
+    }
+  return mesh;
+}
+
+SurfaceHit hitOf(const Scene& scene, const Ray& ray) {
+  const RayTracer tracer(scene);
+  const auto hit = tracer.trace(ray);
+  REQUIRE(hit);
+  return *hit;
+}
+
+// Leaves a closed convex shape from points on it: nothing is hit outwards, the far wall is hit inwards.
+struct Leaks {
+  int self = 0, through = 0;
+};
+Leaks leaksOf(const Geometry& geometry, const Vec3& centre, float size) {
+  Scene scene;
+  addShape(scene, geometry, -1);
+  const RayTracer tracer(scene);
+  Leaks leaks;
+  Rng rng(3);
+  for (int i = 0; i < 20000; ++i) {
+    const Vec3 from = centre + 3 * size * randomDirection(rng);
+    const Vec3 to = centre + 0.4f * size * randomDirection(rng);
+    const auto hit = tracer.trace({from, (to - from).normalized()});
+    if (!hit) {
+      ++leaks.through;
+      continue;
+    }
+    const Ray out = spawnRay(*hit, randomDirection(rng, hit->normal));
+    leaks.self += tracer.occluded(out);
+    const Ray in = spawnRay(*hit, randomDirection(rng, -hit->normal));
+    const auto far = tracer.trace(in);
+    leaks.through += !far || far->normal.dot(in.direction) < 0;
+  }
+  return leaks;
+}
+
+}  // namespace
+
+TEST_CASE("render: rays leave surfaces at any scale") {
+  const float size = GENERATE(1e-4f, 1e-2f, 1.0f, 1e4f);
+  const float away = GENERATE(0.0f, 30.0f);  // of the coordinates' origin, in units of size
+  const Vec3 centre = size * away * Vec3(0.3f, -0.8f, 0.52f);
+  CAPTURE(size, away);
+  const auto check = [&](const Geometry& geometry) {
+    const Leaks leaks = leaksOf(geometry, centre, size);
+    CHECK(leaks.self == 0);
+    CHECK(leaks.through == 0);
+  };
+  SECTION("sphere") {
+    check(Sphere{centre, size});
+  }
+  SECTION("box") {
+    check(box(centre - Vec3::Constant(size), centre + Vec3::Constant(size), false));
+  }
+  SECTION("mesh") {
+    check(sphereMesh(centre, size, 12));
+  }
+}
+
+TEST_CASE("render: an offset is small beside the scene") {
+  Scene scene;
+  addShape(scene, sphereMesh({0, 0, 0}, 1.0f, 12), -1);
+  const SurfaceHit hit = hitOf(scene, {Vec3(3, 2, 1), -Vec3(3, 2, 1).normalized()});
+  CHECK(hit.offset > 0);
+  CHECK(hit.offset < 2e-5f);
+}
+
+TEST_CASE("render: light does not pass where boxes touch a floor") {
+  Scene scene;
+  addShape(scene, rectangle({-5, 0, -5}, {0, 0, 10}, {10, 0, 0}), -1);
+  addEmitter(scene, rectangle({-1, -0.01f, -1}, {0, 0, 2}, {2, 0, 0}), 1);  // just below the floor, shining up
+  const RenderScene ready(scene);
+  const SurfaceHit floor = hitOf(scene, {Vec3(0.3f, 1, 0.2f), Vec3(0, -1, 0)});
+  Rng rng(1);
+  for (int i = 0; i < 1000; ++i) {
+    const float choice = rng.uniform();
+    const auto light = ready.lights.sample(Vec3(0.3f, 0.5f, 0.2f), choice, rng.uniform2());
+    REQUIRE(light);
+    SurfacePoint above = floor;
+    above.position.y() += 0.5f;
+    CHECK_FALSE(ready.visible(above, *light));
+  }
+}
+
+TEST_CASE("render: a hit tells position, sides, coordinates and frame") {
+  Scene scene;
+  const int material = addMaterial(scene, std::make_shared<Diffuse>(0.5f));
+  SECTION("triangle") {
+    addShape(scene, rectangle({0, 0, 0}, {0, 0, 4}, {2, 0, 0}), material);
+    const SurfaceHit hit = hitOf(scene, {Vec3(0.5f, 2, 3), Vec3(0, -1, 0)});
+    CHECK((hit.position - Vec3(0.5f, 0, 3)).norm() < 1e-6f);
+    CHECK((hit.normal - Vec3(0, 1, 0)).norm() < 1e-6f);
+    CHECK((hit.uv - Vec2(0.75f, 0.25f)).norm() < 1e-6f);
+    CHECK((hit.frame.s - Vec3(0, 0, 1)).norm() < 1e-6f);  // along u
+    CHECK(hit.wo.z() == Approx(1));
+    CHECK(hit.distance == Approx(2));
+    CHECK(hit.bsdf == scene.materials[0].bsdf.get());
+    const SurfaceHit behind = hitOf(scene, {Vec3(0.5f, -2, 3), Vec3(0, 1, 0)});
+    CHECK((behind.normal - Vec3(0, 1, 0)).norm() < 1e-6f);
+    CHECK(behind.wo.z() == Approx(-1));
+  }
+  SECTION("triangle with normals that point to the other side") {
+    TriangleMesh mesh = rectangle({0, 0, 0}, {0, 0, 4}, {2, 0, 0});
+    mesh.normals.assign(4, Vec3(0.6f, -0.8f, 0));
+    addShape(scene, mesh, material);
+    const SurfaceHit hit = hitOf(scene, {Vec3(0.5f, 2, 3), Vec3(0, -1, 0)});
+    CHECK((hit.frame.n - Vec3(-0.6f, 0.8f, 0)).norm() < 1e-6f);
+    const Vec3 grazing = Vec3(1, 0.1f, 0).normalized();  // above the surface, below the shading normal's horizon
+    CHECK_FALSE(sidesAgree(hit, grazing, hit.frame.toLocal(grazing)));
+    CHECK(sidesAgree(hit, Vec3(0, 1, 0), hit.frame.toLocal(Vec3(0, 1, 0))));
+    CHECK(sidesAgree(hit, Vec3(0, -1, 0), hit.frame.toLocal(Vec3(0, -1, 0))));
+  }
+  SECTION("sphere, from outside and inside") {
+    const bool flipped = GENERATE(false, true);
+    addShape(scene, Sphere{{1, 2, 3}, 0.5f, flipped}, material);
+    const float side = flipped ? -1.0f : 1.0f;
+    for (const float start : {5.0f, 1.0f}) {
+      const SurfaceHit hit = hitOf(scene, {Vec3(start, 2, 3), start > 1 ? Vec3(-1, 0, 0) : Vec3(1, 0, 0)});
+      CHECK((hit.position - Vec3(1.5f, 2, 3)).norm() < 1e-6f);
+      CHECK((hit.normal - Vec3(side, 0, 0)).norm() < 1e-6f);
+      CHECK((hit.frame.s - Vec3(0, 1, 0)).norm() < 1e-5f);
+      CHECK((hit.uv - Vec2(0, 0.5f)).norm() < 1e-6f);
+    }
+  }
+  SECTION("disk") {
+    addShape(scene, Disk{{0, 1, 0}, {0, 0, 2}, {2, 0, 0}}, material);
+    const SurfaceHit hit = hitOf(scene, {Vec3(1, 3, 0), Vec3(0, -1, 0)});
+    CHECK((hit.position - Vec3(1, 1, 0)).norm() < 1e-6f);
+    CHECK((hit.normal - Vec3(0, 1, 0)).norm() < 1e-6f);
+    CHECK((hit.uv - Vec2(0.5f, 0.25f)).norm() < 1e-6f);
+    CHECK_FALSE(RayTracer(scene).trace({Vec3(1.5f, 3, 1.5f), Vec3(0, -1, 0)}));
+  }
+}
+
+TEST_CASE("render: a spherical triangle mesh is closed to rays") {
+  Scene scene;
+  addShape(scene, sphereMesh({0, 0, 0}, 1.0f, 40), -1);
+  const RayTracer tracer(scene);
+  Rng rng(5);
+  int missed = 0;
+  for (int i = 0; i < 100000; ++i) missed += !tracer.occluded({Vec3(0.1f, 0.2f, 0.3f), randomDirection(rng)});
+  CHECK(missed == 0);
+  CHECK((tracer.bounds().max() - Vec3(1, 1, 1)).norm() < 0.01f);
+}
+
+namespace {
+
+class Tilted : public Diffuse {
+ public:
+  Tilted() : Diffuse(0.5f) {}
+  Vec3 perturbedNormal(const Vec2&, const Vec3& dpdu, const Vec3&) const override {
+    return Vec3(0.6f * dpdu.normalized() + 0.8f * Vec3::UnitZ());
+  }
+};
+
+}  // namespace
+
+TEST_CASE("render: the frame follows the bump") {
+  Scene scene;
+  addShape(scene, rectangle({0, 0, 0}, {0, 0, 4}, {2, 0, 0}), addMaterial(scene, std::make_shared<Tilted>()));
+  const SurfaceHit hit = hitOf(scene, {Vec3(0.5f, 2, 3), Vec3(0, -1, 0)});
+  CHECK((hit.frame.n - Vec3(0, 0.8f, 0.6f)).norm() < 1e-6f);
+  CHECK((hit.normal - Vec3(0, 1, 0)).norm() < 1e-6f);
+  CHECK(hit.wo.z() == Approx(0.8f));
+}
+
+TEST_CASE("render: an image is not mirrored") {
+  Camera camera;
+  camera.width = 200, camera.height = 100, camera.horizontalFov = 90;
+  const PinholeCamera pinhole(camera, {});
+  // Local axes as Mitsuba has them: looking along +z, +x is to the left.
+  CHECK((pinhole.rayThrough({100, 50}).direction - Vec3(0, 0, 1)).norm() < 1e-6f);
+  CHECK((pinhole.rayThrough({0, 50}).direction - Vec3(1, 0, 1).normalized()).norm() < 1e-6f);
+  CHECK((pinhole.rayThrough({100, 0}).direction - Vec3(0, 0.5f, 1).normalized()).norm() < 1e-6f);
+  camera.toWorld.col(0) = -camera.toWorld.col(0);
+  camera.toWorld(1, 3) = 7;
+  const PinholeCamera turned(camera, {});
+  CHECK((turned.rayThrough({0, 50}).direction - Vec3(-1, 0, 1).normalized()).norm() < 1e-6f);
+  CHECK(turned.rayThrough({0, 50}).origin.y() == 7);
+}
+
+TEST_CASE("render: filters are sampled by their shape") {
+  const auto moments = [](const PixelFilter& filter) {
+    const FilterSampler sampler(filter);
+    Rng rng(2);
+    Moments first, second;
+    float widest = 0;
+    for (int i = 0; i < 200000; ++i) {
+      const float x = sampler.sample(rng.uniform2()).x();
+      first.add(x);
+      second.add(x * x);
+      widest = std::max(widest, std::abs(x));
+    }
+    CHECK(widest <= filter.radius);
+    CHECK(deviation(first, 0) < kMaxDeviation);
+    return second;
+  };
+  CHECK(deviation(moments({PixelFilter::Kind::box, 0.5f, 0}), 1.0 / 12) < kMaxDeviation);
+  CHECK(deviation(moments({PixelFilter::Kind::tent, 1.0f, 0}), 1.0 / 6) < kMaxDeviation);
+  // ∫ x² (g(x) − g(2)) / ∫ (g(x) − g(2)) over [−2, 2] for σ = 0.5.
+  CHECK(deviation(moments({PixelFilter::Kind::gaussian, 2.0f, 0.5f}), 0.248571) < kMaxDeviation);
+}
+
+TEST_CASE("render: cameras without meaning are refused") {
+  Camera camera;
+  SECTION("field of view") {
+    camera.horizontalFov = 180;
+    CHECK_THROWS_WITH(PinholeCamera(camera, {}), Catch::Contains("field of view"));
+  }
+  SECTION("size") {
+    camera.width = 0;
+    CHECK_THROWS_WITH(PinholeCamera(camera, {}), Catch::Contains("0x576"));
+  }
+  SECTION("matrix") {
+    camera.toWorld.setZero();
+    CHECK_THROWS_WITH(PinholeCamera(camera, {}), Catch::Contains("to_world"));
+  }
+}
