@@ -20,6 +20,7 @@ void Parameters::set(const std::string& name, ParameterValue value, std::ptrdiff
 }
 
 const Parameters::Entry* Parameters::find(std::string_view name) const {
+  asked_.emplace(name);
   const auto it = entries_.find(name);
   if (it == entries_.end()) return nullptr;
   it->second.used = true;

@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <map>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -53,7 +54,12 @@ class Parameters {
   /// The only nested BSDF; ParameterError when there are none or several.
   BsdfPtr onlyChild() const;
 
+  /// Marks a parameter as used that is understood but of no concern.
+  void ignore(std::string_view name) const { find(name); }
+
   std::vector<std::string> unused() const;
+  /// Every name that was asked for, there or not: what the model knows, for messages.
+  const std::set<std::string, std::less<>>& asked() const { return asked_; }
   std::ptrdiff_t location(std::string_view name) const;  ///< 0 when unknown
 
  private:
@@ -65,6 +71,7 @@ class Parameters {
   const Entry* find(std::string_view name) const;
 
   std::map<std::string, Entry, std::less<>> entries_;
+  mutable std::set<std::string, std::less<>> asked_;
   std::vector<BsdfPtr> children_;
 };
 

@@ -10,7 +10,8 @@
 
 namespace lobe {
 
-/// A fault in a scene file; what() is one line, "FILE:LINE:COLUMN: message", and says what is known or expected instead.
+/// A fault in a scene file; what() is one line, "FILE:LINE:COLUMN: message", and says what is known or expected
+/// instead.
 class SceneError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

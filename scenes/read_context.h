@@ -1,0 +1,50 @@
+#pragma once
+// What all parts of the reader share: the file, the options, and where findings go.
+
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "scenes/reader.h"
+#include "scenes/scene_file.h"
+
+namespace lobe {
+
+class ReadContext {
+ public:
+  ReadContext(const SceneFile& sceneFile, const ReadOptions& readOptions, Scene& result)
+      : file(sceneFile), options(readOptions), scene(result) {}
+
+  /// Something not known or not there: throws SceneError, or with --lenient notes a warning, the first time for each
+  /// kind, and returns. The message says what is known; consequence says what happens instead ("a grey one is used").
+  void unsupported(pugi::xml_node node, const std::string& kind, std::string_view message,
+                   std::string_view consequence) {
+    unsupported(SceneFile::location(node), kind, message, consequence);
+  }
+  void unsupported(std::ptrdiff_t location, const std::string& kind, std::string_view message,
+                   std::string_view consequence);
+
+  /// What was read but replaced by something of ours; equal notes are kept once.
+  void note(std::string text);
+
+  const SceneFile& file;
+  const ReadOptions& options;
+  Scene& scene;
+
+ private:
+  std::set<std::string> warnedKinds_;
+};
+
+/// The type attribute; fails when there is none.
+std::string typeOf(const ReadContext& context, pugi::xml_node node);
+
+/// "bsdf \"plastic\"", or "scene" for an element without type.
+std::string describe(pugi::xml_node node);
+
+/// Name of the element, in today's spelling: camera is sensor, luminaire emitter (Mitsuba 0.4), lookAt lookat.
+std::string_view elementName(pugi::xml_node node);
+
+/// The target of a <ref>; fails when there is no such id.
+pugi::xml_node resolveReference(const ReadContext& context, pugi::xml_node ref);
+
+}  // namespace lobe

@@ -1,0 +1,81 @@
+#include "scenes/reader.h"
+
+#include <fmt/format.h>
+
+#include "scenes/reader_environment.h"
+#include "scenes/reader_parameters.h"
+#include "scenes/reader_sensor.h"
+#include "scenes/reader_shapes.h"
+
+namespace lobe {
+namespace {
+
+constexpr std::string_view kKnown = "default, integrator, sensor, bsdf, texture, shape, emitter, medium";
+
+class SceneReader {
+ public:
+  explicit SceneReader(ReadContext& context)
+      : context_(context),
+        textures_(context),
+        materials_(context, textures_),
+        shapes_(context, textures_, materials_) {}
+
+  void read() {
+    for (const pugi::xml_node node : context_.file.scene().children()) readElement(node);
+    if (!sensor_ && context_.options.geometry)
+      context_.file.fail(context_.file.scene(), "the scene has no <sensor type=\"perspective\">");
+    if (context_.options.geometry) shapes_.readMeshes();
+  }
+
+ private:
+  void readElement(pugi::xml_node node) {
+    const std::string_view tag = elementName(node);
+    if (tag == "shape")
+      shapes_.add(node);
+    else if (tag == "bsdf")
+      materials_.read(node);
+    else if (tag == "texture")
+      textures_.read(node);
+    else if (tag == "emitter")
+      readEnvironment(context_, textures_, node);
+    else if (tag == "sensor")
+      readFirstSensor(node);
+    else if (tag == "integrator")
+      readIntegrator(context_, node);
+    else if (tag == "medium")
+      context_.note("media are left out: the inside of shapes is clear");
+    else if (tag != "default")
+      reject(node);
+  }
+
+  void readFirstSensor(pugi::xml_node node) {
+    if (sensor_) return context_.note("only the first of several sensors is used");
+    sensor_ = true;
+    readSensor(context_, node);
+  }
+
+  void reject(pugi::xml_node node) {
+    if (node.type() != pugi::node_element)
+      context_.file.fail(node, fmt::format("text \"{}\" where an element is needed", node.value()));
+    context_.unsupported(node, fmt::format("<{}> in scene", node.name()),
+                         fmt::format("unknown element <{}>; known are {}", node.name(), kKnown), "it is left out");
+  }
+
+  ReadContext& context_;
+  TextureReader textures_;
+  MaterialReader materials_;
+  ShapeReader shapes_;
+  bool sensor_ = false;
+};
+
+}  // namespace
+
+Scene readScene(const std::filesystem::path& path, const ReadOptions& options) {
+  const SceneFile file(path, options.definitions);
+  Scene scene;
+  ReadContext context(file, options, scene);
+  SceneReader(context).read();
+  return scene;
+}
+
+}  // namespace lobe

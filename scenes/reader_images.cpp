@@ -1,0 +1,93 @@
+#include "scenes/reader_images.h"
+
+#include <exception>
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include "scenes/reader_parameters.h"
+#include "scenes/values.h"
+
+namespace lobe {
+namespace {
+
+bool namesImage(pugi::xml_node node, bool environment) {
+  const std::string_view type = node.attribute("type").value();
+  return (elementName(node) == "texture" && type == "bitmap") ||
+         (environment && elementName(node) == "emitter" && type == "envmap");
+}
+
+/// The parameters that matter here, as far as they make sense; faults are found later, when the element is read.
+std::optional<ImageRequest> peek(const ReadContext& context, pugi::xml_node node) {
+  Parameters parameters;
+  for (const pugi::xml_node child : node.children()) {
+    const std::string name = normalisedName(child.attribute("name").value());
+    const char* value = child.attribute("value").value();
+    if (name == "filename") parameters.set(name, std::string(value));
+    if (const std::optional<bool> raw = parseBoolean(value); raw && name == "raw") parameters.set(name, *raw);
+    if (const std::optional<double> gamma = parseNumber(value); gamma && name == "gamma") parameters.set(name, *gamma);
+  }
+  try {
+    return imageRequest(context, parameters);
+  } catch (const ParameterError&) {
+    return std::nullopt;
+  }
+}
+
+void collect(const ReadContext& context, pugi::xml_node node, std::vector<ImageRequest>& requests) {
+  if (namesImage(node, context.options.geometry))
+    if (const std::optional<ImageRequest> request = peek(context, node)) requests.push_back(*request);
+  for (const pugi::xml_node child : node.children()) collect(context, child, requests);
+}
+
+Encoding encodingOf(const Parameters& parameters) {
+  const bool raw = parameters.flag("raw", false);
+  const double gamma = parameters.number("gamma", -1.0);
+  if (gamma != -1.0 && !(gamma > 0.0)) throw ParameterError("gamma", "gamma must be positive, or -1 for sRGB");
+  if (raw || gamma == 1.0) return {Encoding::Kind::linear, 1.0f};
+  if (gamma == -1.0) return {Encoding::Kind::srgb, 1.0f};
+  return {Encoding::Kind::gamma, static_cast<float>(gamma)};
+}
+
+}  // namespace
+
+ImageRequest imageRequest(const ReadContext& context, const Parameters& parameters) {
+  return {context.file.resolve(requiredText(parameters, "filename")), encodingOf(parameters)};
+}
+
+ImageStore::ImageStore(const ReadContext& context) {
+  std::vector<ImageRequest> requests;
+  collect(context, context.file.scene(), requests);
+  std::vector<std::pair<ImageRequest, Entry*>> reads;
+  for (const ImageRequest& request : requests)
+    if (const auto [entry, isNew] = entries_.try_emplace(keyOf(request)); isNew)
+      reads.emplace_back(request, &entry->second);
+  tbb::parallel_for(std::size_t{0}, reads.size(), [&](std::size_t i) { *reads[i].second = read(reads[i].first); });
+}
+
+ImageStore::Key ImageStore::keyOf(const ImageRequest& request) {
+  return {request.path, request.encoding.kind, request.encoding.exponent};
+}
+
+ImageStore::Entry ImageStore::read(const ImageRequest& request) {
+  try {
+    return {std::make_shared<const Image>(readImage(request.path, request.encoding)), ""};
+  } catch (const std::exception& error) {
+    return {nullptr, error.what()};
+  }
+}
+
+std::shared_ptr<const Image> ImageStore::get(ReadContext& context, pugi::xml_node node, const Parameters& parameters,
+                                             const std::string& remedy) {
+  const ImageRequest request = imageRequest(context, parameters);
+  const auto [entry, isNew] = entries_.try_emplace(keyOf(request));
+  if (isNew) entry->second = read(request);
+  if (entry->second.image) return entry->second.image;
+  const std::ptrdiff_t location = parameters.location("filename");
+  const std::string message = fmt::format("{}: {}", describe(node), entry->second.fault);
+  if (std::filesystem::exists(request.path)) context.file.fail(location, message);
+  context.unsupported(location, "missing image " + request.path.string(), message, remedy);
+  return nullptr;
+}
+
+}  // namespace lobe

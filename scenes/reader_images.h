@@ -1,0 +1,48 @@
+#pragma once
+// The images of a scene: each file is read once, all at once by all cores.
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "materials/image.h"
+#include "materials/parameters.h"
+#include "scenes/read_context.h"
+
+namespace lobe {
+
+/// The file of an image and how its numbers are meant.
+struct ImageRequest {
+  std::filesystem::path path;
+  Encoding encoding;
+};
+
+/// From the parameters filename, raw and gamma (1 is linear, −1 sRGB) of a bitmap or environment map.
+ImageRequest imageRequest(const ReadContext& context, const Parameters& parameters);
+
+class ImageStore {
+ public:
+  /// Reads every image the file's bitmaps (and environment maps, where geometry is wanted) name, in parallel. Faults
+  /// are kept until the image is asked for.
+  explicit ImageStore(const ReadContext& context);
+
+  /// nullptr when the file is missing and that is tolerated. SceneError at the filename parameter.
+  std::shared_ptr<const Image> get(ReadContext& context, pugi::xml_node node, const Parameters& parameters,
+                                   const std::string& remedy);
+
+ private:
+  using Key = std::tuple<std::filesystem::path, Encoding::Kind, float>;
+  struct Entry {
+    std::shared_ptr<const Image> image;
+    std::string fault;
+  };
+  static Key keyOf(const ImageRequest& request);
+  static Entry read(const ImageRequest& request);
+
+  std::map<Key, Entry> entries_;
+};
+
+}  // namespace lobe

@@ -1,0 +1,33 @@
+#pragma once
+// BSDF elements of scene files, and the list of those that shapes use.
+
+#include <map>
+
+#include "scenes/reader_textures.h"
+
+namespace lobe {
+
+class MaterialReader {
+ public:
+  MaterialReader(ReadContext& context, TextureReader& textures) : context_(context), textures_(textures) {}
+
+  /// Each element is read once. Throws SceneError.
+  BsdfPtr read(pugi::xml_node node);
+
+  /// The index in Scene::materials of the element's BSDF, which is added when it is the first use.
+  int use(pugi::xml_node node);
+  /// The same for shapes without a BSDF: diffuse 0.5 as in Mitsuba, or black as in Mitsuba 3 where they emit.
+  int useDefault(bool emits);
+
+ private:
+  BsdfPtr make(pugi::xml_node node);
+  int add(std::string name, BsdfPtr bsdf);
+
+  ReadContext& context_;
+  TextureReader& textures_;
+  std::map<std::ptrdiff_t, BsdfPtr> done_;   // by place; null while being read
+  std::map<std::ptrdiff_t, int> materials_;  // by place; the defaults at −1 and −2
+  int unnamed_ = 0;
+};
+
+}  // namespace lobe

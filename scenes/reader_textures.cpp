@@ -1,0 +1,127 @@
+#include "scenes/reader_textures.h"
+
+#include <fmt/format.h>
+
+#include "materials/bitmap.h"
+#include "materials/checkerboard.h"
+#include "scenes/reader_parameters.h"
+
+namespace lobe {
+namespace {
+
+/// What takes the place of a texture that cannot be had.
+constexpr float kPlainGrey = 0.5f;
+
+class ScaledTexture final : public Texture {
+ public:
+  ScaledTexture(TexturePtr nested, const Rgb& scale) : nested_(std::move(nested)), scale_(scale) {}
+  Rgb eval(const Vec2& uv) const override { return nested_->eval(uv) * scale_; }
+  Rgb mean() const override { return nested_->mean() * scale_; }
+
+ private:
+  TexturePtr nested_;
+  Rgb scale_;
+};
+
+struct UvMap {
+  Vec2 scale;
+  Vec2 offset;
+};
+
+/// Mitsuba 0.6's four numbers, or Mitsuba 3's transform, of which translations and scales along the axes are taken.
+UvMap readUvMap(const Parameters& parameters) {
+  if (!parameters.has("to_uv")) {
+    const auto number = [&](const char* name, double fallback) {
+      return static_cast<float>(parameters.number(name, fallback));
+    };
+    return {Vec2(number("uscale", 1), number("vscale", 1)), Vec2(number("uoffset", 0), number("voffset", 0))};
+  }
+  const Eigen::Matrix4d m = parameters.transform("to_uv");
+  if (m(0, 1) != 0 || m(1, 0) != 0) throw ParameterError("to_uv", "to_uv may scale and translate, but not rotate");
+  // A matrix of 9 numbers has its translation in the third column, where (u, v) has its 1.
+  return {Vec2(m.diagonal().head<2>().cast<float>()), Vec2((m.col(2) + m.col(3)).head<2>().cast<float>())};
+}
+
+Wrap parseWrap(const std::string& parameter, const std::string& mode) {
+  if (mode == "repeat") return Wrap::repeat;
+  if (mode == "mirror") return Wrap::mirror;
+  if (mode == "clamp") return Wrap::clamp;
+  throw ParameterError(parameter, fmt::format("unknown wrap mode \"{}\"; known are repeat, mirror, clamp", mode));
+}
+
+bool readNearest(const Parameters& parameters) {
+  const std::string filter = parameters.text("filter_type", "bilinear");
+  // Without ray differentials, what prefilters is bilinear.
+  if (filter != "nearest" && filter != "bilinear" && filter != "trilinear" && filter != "ewa")
+    throw ParameterError("filter_type",
+                         fmt::format("unknown filter \"{}\"; known are nearest, bilinear, trilinear, ewa", filter));
+  return filter == "nearest";
+}
+
+BitmapOptions readBitmapOptions(const Parameters& parameters) {
+  BitmapOptions options;
+  const std::string both = parameters.text("wrap_mode", "repeat");
+  options.wrapU = parseWrap("wrap_mode", both);
+  options.wrapV = options.wrapU;
+  if (parameters.has("wrap_mode_u")) options.wrapU = parseWrap("wrap_mode_u", parameters.text("wrap_mode_u", ""));
+  if (parameters.has("wrap_mode_v")) options.wrapV = parseWrap("wrap_mode_v", parameters.text("wrap_mode_v", ""));
+  options.nearest = readNearest(parameters);
+  const UvMap map = readUvMap(parameters);
+  options.uvScale = map.scale;
+  options.uvOffset = map.offset;
+  return options;
+}
+
+TexturePtr makeCheckerboardFrom(const Parameters& parameters) {
+  const UvMap map = readUvMap(parameters);
+  return makeCheckerboard(parameters.texture("color0", grey(0.4f)), parameters.texture("color1", grey(0.2f)), map.scale,
+                          map.offset);
+}
+
+TexturePtr makeScaled(const Parameters& parameters) {
+  return std::make_shared<ScaledTexture>(parameters.onlyTexture(), parameters.colour("scale", grey(1.0f)));
+}
+
+}  // namespace
+
+TexturePtr TextureReader::read(pugi::xml_node node) {
+  const auto [entry, isNew] = done_.try_emplace(SceneFile::location(node));
+  if (isNew)
+    entry->second = make(node);
+  else if (!entry->second)
+    context_.file.fail(node, "a texture that refers to itself");
+  return entry->second;
+}
+
+bool TextureReader::take(pugi::xml_node child, const std::string& name, Parameters& parameters) {
+  if (elementName(child) != "texture") return false;
+  const std::string key = name.empty() ? "texture" : name;
+  if (parameters.has(key)) context_.file.fail(child, fmt::format("the parameter \"{}\" is given twice", key));
+  parameters.set(key, read(child), SceneFile::location(child));
+  return true;
+}
+
+TexturePtr TextureReader::make(pugi::xml_node node) {
+  const std::string type = typeOf(context_, node);
+  if (type != "bitmap" && type != "checkerboard" && type != "scale") {
+    context_.unsupported(node, "texture " + type,
+                         fmt::format("unknown texture type \"{}\"; known are bitmap, checkerboard, scale", type),
+                         "grey is used");
+    return constantTexture(grey(kPlainGrey));
+  }
+  const Parameters parameters = readParameters(
+      context_, node, "texture",
+      [this](pugi::xml_node child, const std::string& name, Parameters& p) { return take(child, name, p); });
+  return makeFrom(context_, node, parameters, [&](const Parameters& p) {
+    if (type == "checkerboard") return makeCheckerboardFrom(p);
+    return type == "scale" ? makeScaled(p) : makeFromBitmap(node, p);
+  });
+}
+
+TexturePtr TextureReader::makeFromBitmap(pugi::xml_node node, const Parameters& parameters) {
+  const BitmapOptions options = readBitmapOptions(parameters);
+  const std::shared_ptr<const Image> image = images_.get(context_, node, parameters, "grey is used");
+  return image ? makeBitmap(image, options) : constantTexture(grey(kPlainGrey));
+}
+
+}  // namespace lobe
