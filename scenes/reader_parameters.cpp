@@ -3,6 +3,7 @@
 #include <optional>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "scenes/transforms.h"
 #include "scenes/values.h"
@@ -102,7 +103,9 @@ void failAt(const ReadContext& context, pugi::xml_node node, const Parameters& p
 void checkUnused(ReadContext& context, pugi::xml_node node, const Parameters& parameters) {
   for (const std::string& name : parameters.unused())
     context.unsupported(parameters.location(name), fmt::format("{} of {}", name, describe(node)),
-                        fmt::format("unknown parameter \"{}\" of {}", name, describe(node)), "it is ignored");
+                        fmt::format("unknown parameter \"{}\" of {}; known are {}", name, describe(node),
+                                    fmt::join(parameters.asked(), ", ")),
+                        "it is ignored");
 }
 
 void noteUnused(ReadContext& context, pugi::xml_node node, const Parameters& parameters) {
