@@ -54,9 +54,6 @@ class Parameters {
   /// The only nested BSDF; ParameterError when there are none or several.
   BsdfPtr onlyChild() const;
 
-  /// Marks a parameter as used that is understood but of no concern.
-  void ignore(std::string_view name) const { find(name); }
-
   std::vector<std::string> unused() const;
   /// Every name that was asked for, there or not: what the model knows, for messages.
   const std::set<std::string, std::less<>>& asked() const { return asked_; }
