@@ -36,6 +36,20 @@ std::string_view elementName(pugi::xml_node node) {
   return name;
 }
 
+void rejectText(const ReadContext& context, pugi::xml_node node) {
+  if (node.type() == pugi::node_element) return;
+  constexpr std::string_view kBlanks = " \t\r\n";
+  const std::string_view text = node.value();
+  const std::size_t begin = std::min(text.find_first_not_of(kBlanks), text.size());
+  const std::string_view word = text.substr(begin, text.find_first_of(kBlanks, begin) - begin);
+  context.file.fail(SceneFile::location(node) + static_cast<std::ptrdiff_t>(begin),
+                    fmt::format("text \"{}\" where an element is needed", word));
+}
+
+void noteMedium(ReadContext& context) {
+  context.note("media are left out: the inside of shapes is clear");
+}
+
 pugi::xml_node resolveReference(const ReadContext& context, pugi::xml_node ref) {
   const pugi::xml_attribute id = ref.attribute("id");
   if (!id) context.file.fail(ref, "<ref> needs an id");

@@ -44,6 +44,12 @@ std::string describe(pugi::xml_node node);
 /// Name of the element, in today's spelling: camera is sensor, luminaire emitter (Mitsuba 0.4), lookAt lookat.
 std::string_view elementName(pugi::xml_node node);
 
+/// Fails when the node is text, at its first word: scene files keep everything in attributes.
+void rejectText(const ReadContext& context, pugi::xml_node node);
+
+/// Notes that participating media are not rendered.
+void noteMedium(ReadContext& context);
+
 /// The target of a <ref>; fails when there is no such id.
 pugi::xml_node resolveReference(const ReadContext& context, pugi::xml_node ref);
 

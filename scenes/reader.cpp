@@ -43,7 +43,7 @@ class SceneReader {
     else if (tag == "integrator")
       readIntegrator(context_, node);
     else if (tag == "medium")
-      context_.note("media are left out: the inside of shapes is clear");
+      noteMedium(context_);
     else if (tag != "default")
       reject(node);
   }
@@ -55,8 +55,7 @@ class SceneReader {
   }
 
   void reject(pugi::xml_node node) {
-    if (node.type() != pugi::node_element)
-      context_.file.fail(node, fmt::format("text \"{}\" where an element is needed", node.value()));
+    rejectText(context_, node);
     context_.unsupported(node, fmt::format("<{}> in scene", node.name()),
                          fmt::format("unknown element <{}>; known are {}", node.name(), kKnown), "it is left out");
   }

@@ -62,11 +62,6 @@ void setValue(const ReadContext& context, pugi::xml_node node, ParameterValue va
   parameters.set(key, std::move(value), SceneFile::location(node));
 }
 
-void rejectText(const ReadContext& context, pugi::xml_node node) {
-  if (node.type() != pugi::node_element)
-    context.file.fail(node, fmt::format("text \"{}\" where an element is needed", node.value()));
-}
-
 }  // namespace
 
 Parameters readParameters(ReadContext& context, pugi::xml_node node, const std::string& knownChildren,

@@ -142,7 +142,7 @@ void readSensor(ReadContext& context, pugi::xml_node node) {
     else if (tag == "sampler")
       noteSampler(context, child);
     else if (tag == "medium")
-      context.note("media are left out: the inside of shapes is clear");
+      noteMedium(context);
     return tag == "film" || tag == "sampler" || tag == "medium";
   };
   const Parameters parameters = readParameters(context, node, "film, sampler", onChild);

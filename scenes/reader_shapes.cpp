@@ -80,7 +80,7 @@ bool ShapeReader::take(pugi::xml_node child, Parts& parts) {
   } else if (tag == "emitter") {
     takeEmitter(child, parts);
   } else if (tag == "medium") {
-    context_.note("media are left out: the inside of shapes is clear");
+    noteMedium(context_);
   } else {
     return false;
   }

@@ -57,6 +57,7 @@ void SceneFile::substituteAll() {
   for (const pugi::xml_node node : scene_.children("default")) {
     const pugi::xml_attribute name = node.attribute("name"), value = node.attribute("value");
     if (!name || !value) fail(node, "<default> needs a name and a value");
+    usedNames_.insert(name.value());
     values_.emplace(name.value(), substituted(value.value(), node));
   }
   substitute(scene_);

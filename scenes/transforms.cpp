@@ -86,7 +86,7 @@ Eigen::Matrix4d readTransform(ReadContext& context, pugi::xml_node transform) {
   checkAttributes(context, transform, {"name"});
   Eigen::Matrix4d product = Eigen::Matrix4d::Identity();
   for (const pugi::xml_node step : transform.children()) {
-    if (step.type() != pugi::node_element) context.file.fail(step, "text in a <transform>");
+    rejectText(context, step);
     product = readStep(context, step) * product;
   }
   return product;
