@@ -1,10 +1,15 @@
 #include "runtime/mixture/em.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
+#include <vector>
 
 #include "runtime/mixture/eigenvalue_floor.h"
+#include "runtime/mixture/fast_exp.h"
 
 namespace lobe {
 
@@ -12,59 +17,96 @@ namespace {
 
 constexpr double kLogTwoPi = 1.8378770664093454836;
 
-// A component made ready for the E step, and what the M step needs of it.
-struct Component {
-  double logScale;  // log of weight / (2π sqrt|Σ|)
-  double x, y, slope, invAlong, invAcross;
-  double mass = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0;
+constexpr std::size_t kLanes = 8;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-  explicit Component(const Gaussian& g)
-      : x(g.meanX),
-        y(g.meanY),
-        slope(static_cast<double>(g.cov.xy) / g.cov.xx),
-        invAlong(1 / static_cast<double>(g.cov.xx)) {
-    const double across = g.cov.yy - slope * g.cov.xy;
-    invAcross = 1 / across;
-    logScale = std::log(static_cast<double>(g.weight)) - kLogTwoPi - 0.5 * std::log(g.cov.xx * across);
-  }
-  double logDensity(double px, double py) const {
-    const double dx = px - x, across = py - y - slope * dx;
-    return logScale - 0.5 * (dx * dx * invAlong + across * across * invAcross);
-  }
-  // Moments about the present mean, so that narrow lobes lose no digits.
-  void add(double weight, double px, double py) {
-    const double dx = px - x, dy = py - y;
-    mass += weight;
-    sx += weight * dx, sy += weight * dy;
-    sxx += weight * dx * dx, sxy += weight * dx * dy, syy += weight * dy * dy;
-  }
+// Eight components side by side, so that the loops over them vectorise: made ready for the E step, and what the M step
+// needs of them. Lanes without a component never get a share.
+struct Block {
+  using Lane = std::array<double, kLanes>;
+  Lane logScale;  // log of weight / (2π sqrt|Σ|)
+  Lane x{}, y{}, slope{}, along{}, across{};
+  Lane mass{}, sx{}, sy{}, sxx{}, sxy{}, syy{};  // moments about the present mean: narrow lobes lose no digits
+  Lane log{};                                    // density of the point at hand
+  std::array<float, kLanes> share{};
+
+  Block() { logScale.fill(-kInfinity); }
+  void set(std::size_t k, const Gaussian& g);
+  double logDensities(double px, double py);
+  double shares(double largest);
+  void add(double px, double py, double scale);
+  void maximise(std::size_t k, double totalWeight, double minVariance, Gaussian& g) const;
 };
 
-// Adds a point to all components by its responsibilities; returns the log of the mixture's density there. Relative to
-// the largest term, so that points far from every component still count.
-double expectation(const WeightedPoint& point, std::vector<Component>& components, std::vector<double>& share) {
-  double largest = -std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < components.size(); ++k) {
-    share[k] = components[k].logDensity(point.y.x(), point.y.y());
-    largest = std::max(largest, share[k]);
+void Block::set(std::size_t k, const Gaussian& g) {
+  const double xx = g.cov.xx, ratio = g.cov.xy / xx, rest = g.cov.yy - ratio * g.cov.xy;
+  x[k] = g.meanX;
+  y[k] = g.meanY;
+  slope[k] = ratio;
+  along[k] = -0.5 / xx;
+  across[k] = -0.5 / rest;
+  logScale[k] = std::log(static_cast<double>(g.weight)) - kLogTwoPi - 0.5 * std::log(xx * rest);
+}
+
+// Returns the largest.
+double Block::logDensities(double px, double py) {
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    const double dx = px - x[k], dy = py - y[k] - slope[k] * dx;
+    log[k] = logScale[k] + dx * dx * along[k] + dy * dy * across[k];
   }
-  double sum = 0;
-  for (double& s : share) sum += s = std::exp(s - largest);
-  const double scale = point.weight / sum;
-  for (std::size_t k = 0; k < components.size(); ++k)
-    if (share[k] > 0) components[k].add(scale * share[k], point.y.x(), point.y.y());
-  return largest + std::log(sum);
+  return *std::max_element(log.begin(), log.end());
+}
+
+// The densities relative to the largest of all; returns their sum.
+double Block::shares(double largest) {
+  for (std::size_t k = 0; k < kLanes; ++k) share[k] = expNegative(static_cast<float>(log[k] - largest));
+  return std::accumulate(share.begin(), share.end(), 0.0);
+}
+
+void Block::add(double px, double py, double scale) {
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    const double q = scale * share[k], dx = px - x[k], dy = py - y[k];
+    mass[k] += q;
+    sx[k] += q * dx;
+    sy[k] += q * dy;
+    sxx[k] += q * dx * dx;
+    sxy[k] += q * dx * dy;
+    syy[k] += q * dy * dy;
+  }
 }
 
 // A component that no point belongs to keeps its shape and loses its weight.
-void maximisation(const Component& c, double totalWeight, double minVariance, Gaussian& g) {
-  g.weight = static_cast<float>(c.mass / totalWeight);
-  if (!(c.mass > 0)) return;
-  const double dx = c.sx / c.mass, dy = c.sy / c.mass;
-  g.meanX = static_cast<float>(c.x + dx);
-  g.meanY = static_cast<float>(c.y + dy);
-  g.cov =
-      withEigenvalueFloor(c.sxx / c.mass - dx * dx, c.sxy / c.mass - dx * dy, c.syy / c.mass - dy * dy, minVariance);
+void Block::maximise(std::size_t k, double totalWeight, double minVariance, Gaussian& g) const {
+  g.weight = static_cast<float>(mass[k] / totalWeight);
+  if (!(mass[k] > 0)) return;
+  const double dx = sx[k] / mass[k], dy = sy[k] / mass[k];
+  g.meanX = static_cast<float>(x[k] + dx);
+  g.meanY = static_cast<float>(y[k] + dy);
+  g.cov = withEigenvalueFloor(sxx[k] / mass[k] - dx * dx, sxy[k] / mass[k] - dx * dy, syy[k] / mass[k] - dy * dy,
+                              minVariance);
+}
+
+// Adds a point to all components by its responsibilities; returns the log of the mixture's density there. All is
+// relative to the largest term, so that points far from every component still count.
+double expectation(const WeightedPoint& point, std::vector<Block>& blocks) {
+  double largest = -kInfinity, sum = 0;
+  for (Block& b : blocks) largest = std::max(largest, b.logDensities(point.y.x(), point.y.y()));
+  for (Block& b : blocks) sum += b.shares(largest);
+  for (Block& b : blocks) b.add(point.y.x(), point.y.y(), point.weight / sum);
+  return largest + std::log(sum);
+}
+
+// One sweep; returns the mean log-likelihood before it.
+double sweep(std::span<const WeightedPoint> points, double totalWeight, double minVariance, Mixture& mixture,
+             std::vector<Block>& blocks) {
+  blocks.assign(blocks.size(), Block());
+  for (std::size_t k = 0; k < mixture.size(); ++k) blocks[k / kLanes].set(k % kLanes, mixture[k]);
+  double likelihood = 0;
+  for (const WeightedPoint& p : points)
+    if (p.weight > 0) likelihood += p.weight * expectation(p, blocks);
+  for (std::size_t k = 0; k < mixture.size(); ++k)
+    blocks[k / kLanes].maximise(k % kLanes, totalWeight, minVariance, mixture[k]);
+  return likelihood / totalWeight;
 }
 
 double positiveWeight(std::span<const WeightedPoint> points) {
@@ -87,20 +129,11 @@ int weightedEm(std::span<const WeightedPoint> points, Mixture& mixture, const We
   const double totalWeight = positiveWeight(points);
   if (mixture.empty() || !(totalWeight > 0)) return 0;
   normalise(mixture);
-  std::vector<Component> components;
-  components.reserve(mixture.size());
-  std::vector<double> share(mixture.size());
-  double previous = -std::numeric_limits<double>::infinity();
-  for (int sweep = 1; sweep <= options.maxSweeps; ++sweep) {
-    components.clear();
-    for (const Gaussian& g : mixture) components.emplace_back(g);
-    double likelihood = 0;
-    for (const WeightedPoint& p : points)
-      if (p.weight > 0) likelihood += p.weight * expectation(p, components, share);
-    likelihood /= totalWeight;
-    for (std::size_t k = 0; k < mixture.size(); ++k)
-      maximisation(components[k], totalWeight, options.minVariance, mixture[k]);
-    if (std::abs(likelihood - previous) <= options.tolerance * std::abs(likelihood)) return sweep;
+  std::vector<Block> blocks((mixture.size() + kLanes - 1) / kLanes);
+  double previous = -kInfinity;
+  for (int i = 1; i <= options.maxSweeps; ++i) {
+    const double likelihood = sweep(points, totalWeight, options.minVariance, mixture, blocks);
+    if (std::abs(likelihood - previous) <= options.tolerance * std::abs(likelihood)) return i;
     previous = likelihood;
   }
   return options.maxSweeps;

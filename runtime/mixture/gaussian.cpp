@@ -4,13 +4,11 @@
 #include <numbers>
 #include <utility>
 
-#include "runtime/mixture/fast_exp.h"
+#include "runtime/mixture/normal_kernel.h"
 
 namespace lobe {
 
 namespace {
-
-constexpr float kInvTwoPi = 0.5f * std::numbers::inv_pi_v<float>;
 
 // log of the determinant, of merged components too, in double: costs are small differences of large terms.
 double logDeterminant(const Covariance& c) {
@@ -38,13 +36,7 @@ Moments mergedMoments(const Gaussian& a, const Gaussian& b) {
 }  // namespace
 
 float normalPdf(const Gaussian& g, const Vec2& y) {
-  // By the Cholesky factor: stable for long thin lobes, where the terms of the adjugate's quadratic form cancel.
-  const float slope = g.cov.xy / g.cov.xx;
-  const float det = g.cov.determinant();
-  const float dx = y.x() - g.meanX;
-  const float across = (y.y() - g.meanY) - slope * dx;
-  const float square = dx * dx / g.cov.xx + across * across * (g.cov.xx / det);
-  return kInvTwoPi / std::sqrt(det) * expNegative(-0.5f * square);
+  return centredNormal(y.x() - g.meanX, y.y() - g.meanY, g.cov);
 }
 
 float mixturePdf(std::span<const Gaussian> mixture, const Vec2& y) {

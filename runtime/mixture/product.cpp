@@ -1,7 +1,10 @@
 #include "runtime/mixture/product.h"
 
 #include <limits>
+#include <numeric>
 #include <stdexcept>
+
+#include "runtime/mixture/normal_kernel.h"
 
 namespace lobe {
 
@@ -31,10 +34,24 @@ Gaussian pairProduct(const Gaussian& one, const Gaussian& two) {
                      static_cast<float>(k.c * two.cov.xy + k.d * two.cov.yy)}};
 }
 
-// a b N(μ1 − μ2 | 0, Σ1 + Σ2).
-float pairWeight(const Gaussian& one, const Gaussian& two) {
-  const Covariance sum{one.cov.xx + two.cov.xx, one.cov.xy + two.cov.xy, one.cov.yy + two.cov.yy};
-  return one.weight * two.weight * normalPdf({1.0f, two.meanX, two.meanY, sum}, one.mean());
+// The illumination's components side by side, so that the loop over them vectorises.
+struct Columns {
+  std::array<float, kMaxIlluminationComponents> weight, x, y, xx, xy, yy;
+  explicit Columns(std::span<const Gaussian> mixture) {
+    for (std::size_t j = 0; j < mixture.size(); ++j) {
+      const Gaussian& g = mixture[j];
+      weight[j] = g.weight, x[j] = g.meanX, y[j] = g.meanY, xx[j] = g.cov.xx, xy[j] = g.cov.xy, yy[j] = g.cov.yy;
+    }
+  }
+};
+
+// a b_j N(μ − μ_j | 0, Σ + Σ_j) for all j.
+void pairWeights(const Gaussian& one, const Columns& two, std::size_t count, float* pairs) {
+  const Gaussian g = one;  // a copy: `pairs` might alias the original
+  for (std::size_t j = 0; j < count; ++j) {
+    const Covariance sum{g.cov.xx + two.xx[j], g.cov.xy + two.xy[j], g.cov.yy + two.yy[j]};
+    pairs[j] = g.weight * two.weight[j] * centredNormal(g.meanX - two.x[j], g.meanY - two.y[j], sum);
+  }
 }
 
 }  // namespace
@@ -43,11 +60,12 @@ Product::Product(std::span<const Gaussian> reflectance, float constant, std::spa
     : reflectance_(reflectance), illumination_(illumination), constant_(constant) {
   if (reflectance.size() > kMaxReflectanceComponents || illumination.size() > kMaxIlluminationComponents)
     throw std::runtime_error("a product's factor has too many components");
-  float sum = 0;
-  float* pair = pairs_.data();
-  for (const Gaussian& one : reflectance)
-    for (const Gaussian& two : illumination) sum += * pair++ = pairWeight(one, two);
-  for (const Gaussian& two : illumination) sum += * pair++ = constant * two.weight;
+  const std::size_t stride = illumination.size();
+  const Columns columns(illumination);
+  for (std::size_t i = 0; i < reflectance.size(); ++i)
+    pairWeights(reflectance[i], columns, stride, &pairs_[i * stride]);
+  for (std::size_t j = 0; j < stride; ++j) pairs_[reflectance.size() * stride + j] = constant * illumination[j].weight;
+  const float sum = std::accumulate(pairs_.begin(), pairs_.begin() + (reflectance.size() + 1) * stride, 0.0f);
   // The comparison is false for NaN as well.
   mass_ = sum >= kMinMass && sum < std::numeric_limits<float>::infinity() ? sum : 0.0f;
 }

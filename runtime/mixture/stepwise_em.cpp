@@ -67,23 +67,30 @@ class StepwiseEm::Sweep {
   void prepare();
   Covariance covariance(int k, double n) const;
 
-  const StepwiseEmOptions& options_;
-  int count_;
-  std::array<Gaussian, lanes> gaussians_{};
-  float background_;
-  double totalWeight_, backgroundWeight_;
   // Of the E step: means, the inverse Cholesky factor's parts, and (1−u) π / (2π sqrt|Σ|).
-  alignas(64) std::array<float, lanes> x_{}, y_{}, slope_{}, along_{}, across_{}, scale_{};
-  alignas(64) std::array<double, lanes> g_{}, sx_{}, sy_{}, cxx_{}, cxy_{}, cyy_{};
+  alignas(64) std::array<float, lanes> x_{};
+  std::array<float, lanes> y_{}, slope_{}, along_{}, across_{}, scale_{};
+  std::array<double, lanes> g_{}, sx_{}, sy_{}, cxx_{}, cxy_{}, cyy_{};
+  std::array<Gaussian, lanes> gaussians_{};
+  const StepwiseEmOptions& options_;
+  double totalWeight_, backgroundWeight_;
+  int count_;
+  float background_;
+};
+float background_;
+double totalWeight_, backgroundWeight_;
+// Of the E step: means, the inverse Cholesky factor's parts, and (1−u) π / (2π sqrt|Σ|).
+alignas(64) std::array<float, lanes> x_{}, y_{}, slope_{}, along_{}, across_{}, scale_{};
+alignas(64) std::array<double, lanes> g_{}, sx_{}, sy_{}, cxx_{}, cxy_{}, cyy_{};
 };
 
 template <int lanes>
 StepwiseEm::Sweep<lanes>::Sweep(const StepwiseEm& em)
     : options_(em.options_),
-      count_(static_cast<int>(em.gaussians_.size())),
-      background_(em.background_),
       totalWeight_(em.totalWeight_),
-      backgroundWeight_(em.backgroundWeight_) {
+      backgroundWeight_(em.backgroundWeight_),
+      count_(static_cast<int>(em.gaussians_.size())),
+      background_(em.background_) {
   for (int k = 0; k < count_; ++k) {
     const Statistics& s = em.statistics_[k];
     gaussians_[k] = em.gaussians_[k];
