@@ -16,9 +16,9 @@ namespace lobe {
 struct CompileOptions {
   std::filesystem::path directory = "lobes";
   FitSettings settings;
-  int elevations = 64;    ///< records of an isotropic lobe
-  int directions = 1024;  ///< records of an anisotropic lobe
-  bool force = false;     ///< fit what is up to date again
+  int elevations = 64;   ///< records of an isotropic lobe
+  int directions = 512;  ///< records of an anisotropic lobe
+  bool force = false;    ///< fit what is up to date again
 
   /// Throws std::runtime_error that names the option.
   void validate() const;

@@ -25,7 +25,7 @@ struct FitSettings {
   std::string method = "wem";
   std::uint32_t components = 8;
   std::uint32_t samples = 4096;
-  float reduction = 0;
+  float reduction = 0.1f;
   std::uint32_t revision = 1;
   bool operator==(const FitSettings&) const = default;
 };

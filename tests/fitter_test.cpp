@@ -1,0 +1,442 @@
+#include <unistd.h>
+
+#include <array>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+
+#include <tbb/global_control.h>
+
+#include "fitter/cache_mixture.h"
+#include "fitter/compile.h"
+#include "fitter/disc_mass.h"
+#include "fitter/lobe_fit.h"
+#include "fitter/low_discrepancy.h"
+#include "fitter/report.h"
+#include "materials/registry.h"
+#include "runtime/mixture/lookup.h"
+#include "scenes/tool.h"
+#include "schema/atomic_file.h"
+
+using namespace lobe;
+namespace fs = std::filesystem;
+
+namespace {
+
+BsdfPtr roughConductor(double alphaU, double alphaV, const std::string& distribution = "ggx") {
+  Parameters parameters;
+  parameters.set("distribution", distribution);
+  parameters.set("alpha_u", alphaU);
+  parameters.set("alpha_v", alphaV);
+  return makeBsdf("roughconductor", parameters);
+}
+
+LobePtr conductorLobe(double alphaU, double alphaV, const std::string& distribution = "ggx") {
+  return roughConductor(alphaU, alphaV, distribution)->lobes().front();
+}
+
+Vec3 direction(double elevationDegrees, double azimuthDegrees = 0) {
+  const double theta = elevationDegrees * std::numbers::pi / 180, phi = azimuthDegrees * std::numbers::pi / 180;
+  return Vec3(static_cast<float>(std::sin(theta) * std::cos(phi)), static_cast<float>(std::sin(theta) * std::sin(phi)),
+              static_cast<float>(std::cos(theta)));
+}
+
+/// Midpoints of a fine grid of squares over the disc: shares nothing with the fitter but the disc map. f: of y and wi.
+template <class F>
+double discIntegral(int resolution, const F& f) {
+  double sum = 0;
+  const double step = 2.0 / resolution;
+  for (int i = 0; i < resolution; ++i) {
+    for (int j = 0; j < resolution; ++j) {
+      const Vec2 y(static_cast<float>(-1 + (i + 0.5) * step), static_cast<float>(-1 + (j + 0.5) * step));
+      if (insideDisc(y)) sum += f(y, fromDisc(y));
+    }
+  }
+  return sum * step * step;
+}
+
+void checkSound(const FittedRecord& fit) {
+  double sum = 0;
+  REQUIRE(!fit.mixture.empty());
+  for (const Gaussian& g : fit.mixture) {
+    CHECK(g.weight >= 0);
+    CHECK((std::isfinite(g.meanX) && std::isfinite(g.meanY)));
+    CHECK(g.mean().norm() <= 1.0f);
+    CHECK(g.cov.xx > 0);
+    CHECK(g.cov.determinant() > 0);
+    sum += g.weight;
+  }
+  CHECK(sum == Approx(1).margin(1e-5));
+  const CacheRecord& r = fit.record;
+  for (const float v : {r.integral, r.albedo, r.cosineMass, r.outside, r.nev, r.nevCoverage}) CHECK(std::isfinite(v));
+  CHECK(r.albedo <= r.integral);
+  CHECK(r.cosineMass > 0);
+}
+
+/// A constant over the hemisphere, or over a small disc of the disc about (0.3, 0).
+class TestLobe : public Lobe {
+ public:
+  explicit TestLobe(double value, bool samples = true, float radius = 1)
+      : value_(value), samples_(samples), radius_(radius) {}
+  LobeKind kind() const override { return LobeKind::isotropic; }
+  std::string model() const override { return "test"; }
+  std::string key() const override { return "test"; }
+  std::string summary() const override { return "a test lobe"; }
+  int revision() const override { return 1; }
+  double eval(const Vec3&, const Vec3& wi) const override { return pdf({}, wi) > 0 ? value_ : 0; }
+  std::optional<LobeSample> sample(const Vec3&, const Vec2& u) const override {
+    if (!samples_) return std::nullopt;
+    const float r = radius_ * std::sqrt(u.x()), phi = 6.2831853f * u.y();
+    const Vec3 wi = fromDisc(centre() + r * Vec2(std::cos(phi), std::sin(phi)));
+    return LobeSample{wi, pdf({}, wi)};
+  }
+  float pdf(const Vec3&, const Vec3& wi) const override {
+    // With room for the rounding of directions.
+    const bool inside = wi.z() > 0 && (toDisc(wi) - centre()).norm() < 1.1f * radius_;
+    return inside ? 0.15915494f / (radius_ * radius_) : 0;
+  }
+
+ private:
+  Vec2 centre() const { return radius_ < 1 ? Vec2(0.3f, 0) : Vec2(0, 0); }
+  double value_;
+  bool samples_;
+  float radius_;
+};
+
+struct TemporaryFolder {
+  fs::path path;
+  TemporaryFolder() {
+    std::string name = (fs::temp_directory_path() / "lobe-fitter-XXXXXX").string();
+    REQUIRE(mkdtemp(name.data()) != nullptr);
+    path = name;
+  }
+  ~TemporaryFolder() { fs::remove_all(path); }
+};
+
+std::string readFile(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+Scene sceneOf(const std::vector<std::pair<std::string, BsdfPtr>>& materials) {
+  Scene scene;
+  for (const auto& [name, bsdf] : materials) scene.materials.push_back({name, bsdf});
+  return scene;
+}
+
+CompileOptions quickOptions(const fs::path& folder) {
+  CompileOptions options;
+  options.directory = folder / "caches";
+  options.elevations = 6;
+  options.directions = 12;
+  options.settings.samples = 512;
+  return options;
+}
+
+void runAll(const std::vector<CompileJob>& jobs) {
+  for (const CompileJob& job : jobs)
+    if (!job.upToDate) runCompile(job, [] {});
+}
+
+}  // namespace
+
+TEST_CASE("fitter: mass on the disc by quadrature in one dimension agrees with brute force") {
+  const Gaussian cases[] = {{1, 0, 0, {0.01f, 0, 0.01f}},         {1, -0.7f, 0.2f, {0.02f, 0.005f, 0.03f}},
+                            {1, 0.95f, 0, {0.01f, 0, 0.1f}},      {1, 0.6f, 0.6f, {0.3f, -0.2f, 0.4f}},
+                            {1, -0.98f, 0.1f, {0.2f, 0, 0.002f}}, {1, 1.2f, 0.1f, {0.1f, 0.02f, 0.05f}}};
+  for (const Gaussian& g : cases) {
+    const DiscMass mass = discMass(std::span(&g, 1));
+    const double inside = discIntegral(1200, [&](const Vec2& y, const Vec3&) { return normalPdf(g, y); });
+    const double cosine = discIntegral(1200, [&](const Vec2& y, const Vec3& w) { return normalPdf(g, y) * w.z(); });
+    CHECK(mass.inside == Approx(inside).margin(2e-3));
+    CHECK(mass.cosine == Approx(cosine).margin(1e-4));
+  }
+}
+
+TEST_CASE("fitter: mass on the disc adds up by weight and knows the closed forms") {
+  const Gaussian narrow{0.25f, 0.3f, -0.4f, {1e-4f, 2e-5f, 3e-4f}};
+  const DiscMass one = discMass(std::span(&narrow, 1));
+  CHECK(one.inside == Approx(0.25).epsilon(1e-9));
+  CHECK(one.cosine == Approx(0.25 * (1 - 0.09 - 0.16 - 4e-4)).epsilon(1e-6));  // E|y|² = |μ|² + tr Σ
+  // A round one at the centre: 1 − exp(−1/2σ²) of the mass is inside.
+  const Gaussian round{1, 0, 0, {0.25f, 0, 0.25f}};
+  CHECK(discMass(std::span(&round, 1)).inside == Approx(1 - std::exp(-2.0)).epsilon(1e-9));
+}
+
+TEST_CASE("fitter: integral, albedo and cosine mass agree with quadrature over the disc") {
+  for (const double alpha : {0.15, 0.4}) {
+    for (const double elevation : {5.0, 50.0, 80.0}) {
+      const LobePtr lobe = conductorLobe(alpha, alpha);
+      const Vec3 wo = direction(elevation, 30);
+      const FittedRecord fit = fitLobe(*lobe, wo, {});
+      CAPTURE(alpha, elevation);
+      CHECK(fit.record.integral ==
+            Approx(2 * discIntegral(1000, [&](const Vec2&, const Vec3& wi) { return lobe->eval(wo, wi); }))
+                .epsilon(0.02));
+      CHECK(fit.record.albedo ==
+            Approx(2 * discIntegral(1000, [&](const Vec2&, const Vec3& wi) { return lobe->eval(wo, wi) * wi.z(); }))
+                .epsilon(0.01));
+      const auto cosine = [&](const Vec2& y, const Vec3& wi) { return mixturePdf(fit.mixture, y) * wi.z(); };
+      CHECK(fit.record.cosineMass == Approx(discIntegral(1000, cosine)).epsilon(1e-3));
+      const auto density = [&](const Vec2& y, const Vec3&) { return mixturePdf(fit.mixture, y); };
+      CHECK(fit.record.outside == Approx(1 - discIntegral(1000, density)).margin(2e-3));
+    }
+  }
+}
+
+TEST_CASE("fitter: both NEVs are the relative variance by quadrature") {
+  for (const double elevation : {10.0, 60.0, 85.0}) {
+    const LobePtr lobe = conductorLobe(0.3, 0.3);
+    const Vec3 wo = direction(elevation);
+    FitSettings settings;
+    settings.components = 2;  // a poor fit, so that there is something to measure
+    const FittedRecord fit = fitLobe(*lobe, wo, settings);
+    const double mass =
+        discIntegral(1000, [&](const Vec2& y, const Vec3& wi) { return mixturePdf(fit.mixture, y) * wi.z(); });
+    const double mean =
+        2 * discIntegral(1000, [&](const Vec2&, const Vec3& wi) { return lobe->eval(wo, wi) * wi.z(); });
+    const double square = 2 * discIntegral(1000, [&](const Vec2& y, const Vec3& wi) {
+                            const double f = lobe->eval(wo, wi) * wi.z();
+                            const double p =
+                                0.1 * lobe->pdf(wo, wi) + 0.9 * mixturePdf(fit.mixture, y) * wi.z() / mass / 2;
+                            return p > 0 ? f * f / p : 0;
+                          });
+    CAPTURE(elevation);
+    CHECK(fit.record.nev == Approx(square / (mean * mean) - 1).margin(0.02));
+    CHECK(fit.record.nevCoverage == Approx(square / (mean * mean) - 1).margin(0.02));
+  }
+}
+
+TEST_CASE("fitter: GGX fits are as good as weighted EM is known to be") {
+  // Medians over elevation, of ρ cosθ against the defensive density.
+  for (const auto& [alpha, bound] : {std::pair(0.1, 0.142), std::pair(0.3, 0.2)}) {
+    const LobePtr lobe = conductorLobe(alpha, alpha);
+    std::vector<float> nev;
+    for (const double elevation : {3.0, 15.0, 30.0, 45.0, 60.0, 75.0, 85.0}) {
+      const FittedRecord fit = fitLobe(*lobe, direction(elevation), {});
+      CHECK(fit.record.nevCoverage < 2 * bound);
+      nev.push_back(fit.record.nev);
+    }
+    std::ranges::sort(nev);
+    CAPTURE(alpha);
+    CHECK(nev[3] < bound / 2);
+    CHECK(nev.back() < bound);
+  }
+}
+
+TEST_CASE("fitter: the cosine is not in the fit") {
+  // A constant ρ is flat over the disc, so the mixture's mean cosine is that of the disc, ½; with the cosine in the fit
+  // it would be ⅔.
+  const FittedRecord fit = fitLobe(TestLobe(0.3), direction(20), {});
+  const DiscMass mass = discMass(fit.mixture);
+  CHECK(mass.cosine / mass.inside == Approx(0.5).margin(0.08));
+  CHECK(fit.record.integral == Approx(0.3 * 2 * std::numbers::pi).epsilon(1e-4));
+  CHECK(fit.record.albedo == Approx(0.3 * std::numbers::pi).epsilon(1e-3));
+}
+
+TEST_CASE("fitter: fits are sound at every elevation and roughness") {
+  FitSettings settings;
+  settings.samples = 1024;
+  for (const double alpha : {0.001, 0.01, 0.05, 0.2, 0.5, 1.0}) {
+    for (const double elevation : {0.0, 0.01, 20.0, 70.0, 89.0, 89.9, 89.99}) {
+      CAPTURE(alpha, elevation);
+      checkSound(fitLobe(*conductorLobe(alpha, alpha), direction(elevation), settings));
+    }
+  }
+  checkSound(fitLobe(*conductorLobe(0.02, 0.5), direction(80, 45), settings));
+  checkSound(fitLobe(*conductorLobe(0.02, 0.02, "beckmann"), direction(89.9), settings));
+}
+
+TEST_CASE("fitter: few samples and one component are enough for a record") {
+  for (const std::uint32_t components : {1u, 8u, 32u}) {
+    FitSettings settings;
+    settings.components = components;
+    settings.samples = 16;
+    settings.reduction = 0;
+    const FittedRecord fit = fitLobe(*conductorLobe(0.2, 0.2), direction(89.9), settings);
+    checkSound(fit);
+    CHECK(fit.mixture.size() <= components);
+  }
+}
+
+TEST_CASE("fitter: merging saves components") {
+  FitSettings all, some;
+  all.reduction = 0;
+  some.reduction = 0.2f;
+  const LobePtr lobe = conductorLobe(0.1, 0.1);
+  CHECK(fitLobe(*lobe, direction(40), all).mixture.size() == 8);
+  CHECK(fitLobe(*lobe, direction(40), some).mixture.size() < 7);
+}
+
+TEST_CASE("fitter: lobes without value or with values that are no numbers are refused in words") {
+  const DirectionGrid grid{GridKind::elevation, 4};
+  CHECK_THROWS_WITH(fitGrid(TestLobe(1, false), grid, {}),
+                    Catch::Contains("a test lobe") && Catch::Contains("none of its samples"));
+  CHECK_THROWS_WITH(fitGrid(TestLobe(0), grid, {}), Catch::Contains("none of its samples"));
+  CHECK_THROWS_WITH(fitGrid(TestLobe(std::nan("")), grid, {}), Catch::Contains("its value is nan"));
+  CHECK_THROWS_WITH(fitGrid(TestLobe(1, true, 5e-6f), grid, {}), Catch::Contains("too sharp"));
+}
+
+TEST_CASE("fitter: look-up turns and moves mixtures to the query, and its sign is right") {
+  const LobePtr lobe = conductorLobe(0.05, 0.05);
+  const DirectionGrid grid{GridKind::elevation, 24};
+  const FittedGrid fit = fitGrid(*lobe, grid, {});
+  double moved = 0, unmoved = 0, wrong = 0;
+  for (const double elevation : {4.0, 13.0, 29.0, 41.0, 53.0, 66.0, 74.0}) {
+    const Vec3 wo = direction(elevation, 117);
+    const int entry = grid.nearest(wo);
+    const CacheRecord& r = fit.records[static_cast<std::size_t>(entry)];
+    std::array<Gaussian, kMaxCacheComponents> buffer;
+    const auto own = asGaussians(fit.components).subspan(r.first, r.count);
+    const std::span<Gaussian> aligned = alignMixture(grid, entry, own, wo, buffer);
+    REQUIRE(aligned.size() == own.size());
+    moved += gradeMixture(*lobe, wo, aligned, 2048).coverage;
+    const Vec2 step =
+        toDisc(direction(elevation, 117)) - toDisc(grid.direction(entry)).norm() * wo.head<2>().normalized();
+    for (Gaussian& g : aligned) g.meanX += step.x(), g.meanY += step.y();
+    unmoved += gradeMixture(*lobe, wo, aligned, 2048).coverage;
+    for (Gaussian& g : aligned) g.meanX += step.x(), g.meanY += step.y();
+    wrong += gradeMixture(*lobe, wo, aligned, 2048).coverage;
+  }
+  CHECK(moved < 0.7 * unmoved);
+  CHECK(unmoved < 0.7 * wrong);
+}
+
+TEST_CASE("fitter: look-up of an anisotropic grid moves without turning") {
+  const DirectionGrid grid{GridKind::fibonacci, 200};
+  const Gaussian g{1, -0.3f, 0.1f, {0.01f, 0.002f, 0.04f}};
+  std::array<Gaussian, 1> out;
+  const Vec3 wo = direction(40, 70);
+  const int entry = grid.nearest(wo);
+  alignMixture(grid, entry, std::span(&g, 1), wo, out);
+  const Vec2 expected = g.mean() - (toDisc(wo) - toDisc(grid.direction(entry)));
+  CHECK((out[0].mean() - expected).norm() < 1e-6f);
+  CHECK((out[0].cov.xx == g.cov.xx && out[0].cov.xy == g.cov.xy && out[0].cov.yy == g.cov.yy));
+}
+
+TEST_CASE("fitter: look-up pushes no mean out of the disc") {
+  const DirectionGrid grid{GridKind::elevation, 2};
+  const std::array<Gaussian, 2> mixture{{{0.5f, -0.98f, 0.1f, {0.01f, 0, 0.01f}}, {0.5f, -0.2f, 0, {0.01f, 0, 0.01f}}}};
+  std::array<Gaussian, 2> out;
+  for (double elevation = 0; elevation <= 90; elevation += 1.5) {
+    const Vec3 wo = direction(elevation, 200);
+    for (const Gaussian& g : alignMixture(grid, grid.nearest(wo), mixture, wo, out)) CHECK(g.mean().norm() <= 1.00001f);
+  }
+}
+
+TEST_CASE("fitter: equal lobes are fitted once, whatever the material") {
+  const Scene scene = sceneOf({{"red", roughConductor(0.2, 0.2)},
+                               {"rough", roughConductor(0.3, 0.3)},
+                               {"blue", roughConductor(0.2, 0.2)},
+                               {"plain", makeBsdf("diffuse", {})}});
+  const std::vector<LobeUse> uses = collectLobes(scene);
+  REQUIRE(uses.size() == 2);
+  CHECK(uses[0].materials == std::vector<std::string>{"red", "blue"});
+  CHECK(uses[1].materials == std::vector<std::string>{"rough"});
+  CHECK(abbreviated(uses[0].materials) == "red + 1 more");
+}
+
+TEST_CASE("fitter: what is up to date is left alone, what is not says why") {
+  const TemporaryFolder folder;
+  const std::vector<LobeUse> uses =
+      collectLobes(sceneOf({{"iso", roughConductor(0.3, 0.3)}, {"aniso", roughConductor(0.1, 0.3)}}));
+  CompileOptions options = quickOptions(folder.path);
+  std::vector<CompileJob> jobs = planCompile(uses, options);
+  REQUIRE(jobs.size() == 2);
+  CHECK((jobs[0].grid.kind == GridKind::elevation && jobs[1].grid.kind == GridKind::fibonacci));
+  CHECK((!jobs[0].upToDate && jobs[0].stale.empty()));
+  runAll(jobs);
+  for (const CompileJob& job : planCompile(uses, options)) CHECK(job.upToDate);
+
+  options.force = true;
+  CHECK(!planCompile(uses, options)[0].upToDate);
+  options.force = false;
+  options.settings.components = 4;
+  CHECK(planCompile(uses, options)[0].stale == "other fit settings");
+  options = quickOptions(folder.path);
+  options.elevations = 7;
+  jobs = planCompile(uses, options);
+  CHECK(jobs[0].stale == "another grid of directions");
+  CHECK(jobs[1].upToDate);
+  fs::resize_file(jobs[1].path, 100);
+  CHECK_THAT(planCompile(uses, options)[1].stale, Catch::Contains("truncated"));
+}
+
+TEST_CASE("fitter: the same bytes from any number of threads") {
+  const TemporaryFolder folder;
+  const std::vector<LobeUse> uses =
+      collectLobes(sceneOf({{"iso", roughConductor(0.3, 0.3)}, {"aniso", roughConductor(0.1, 0.3)}}));
+  std::array<std::vector<std::string>, 2> contents;
+  for (const std::size_t threads : {1u, 2u}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    CompileOptions options = quickOptions(folder.path);
+    options.directory = folder.path / std::to_string(threads);
+    const std::vector<CompileJob> jobs = planCompile(uses, options);
+    runAll(jobs);
+    for (const CompileJob& job : jobs) contents[threads - 1].push_back(readFile(job.path));
+  }
+  CHECK(contents[0] == contents[1]);
+  CHECK(contents[0][0].size() > 500);
+}
+
+TEST_CASE("fitter: the summary of a cache is that of its records") {
+  const TemporaryFolder folder;
+  LobeCacheInfo info;
+  info.model = info.key = info.summary = info.toolVersion = "x";
+  info.gridCount = 3;
+  const CacheComponent c{1, 0, 0, 0.1f, 0, 0.1f};
+  const CacheComponent half{0.5f, 0, 0, 0.1f, 0, 0.1f};
+  const std::vector<CacheRecord> records{
+      {0, 1, 1, 1, 0.5f, 0.1f, 0.3f, 0.4f}, {1, 2, 1, 1, 0.5f, 0.3f, 0.1f, 0.6f}, {0, 1, 1, 1, 0.5f, 0.2f, 0.2f, 0.5f}};
+  writeAtomically(folder.path / "x.lobe", encodeLobeCache(info, records, std::vector{c, half, half}));
+  const CacheSummary s = summarise(LobeCache::open(folder.path / "x.lobe"));
+  CHECK(s.records == 3);
+  CHECK(s.meanComponents == Approx(4.0 / 3));
+  CHECK(s.nevMedian == Approx(0.2));
+  CHECK(s.nevWorst == Approx(0.3));
+  CHECK(s.coverageMedian == Approx(0.5));
+  CHECK(s.coverageWorst == Approx(0.6));
+  CHECK(s.outside == Approx(0.2));
+}
+
+TEST_CASE("fitter: options out of range are named") {
+  const auto fault = [](const std::function<void(CompileOptions&)>& change) {
+    CompileOptions options;
+    change(options);
+    try {
+      options.validate();
+    } catch (const std::runtime_error& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  CHECK(fault([](CompileOptions&) {}).empty());
+  CHECK_THAT(fault([](CompileOptions& o) { o.settings.components = 0; }), Catch::Contains("--components"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.settings.components = 33; }), Catch::Contains("--components"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.settings.samples = 3; }), Catch::Contains("--samples"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.settings.reduction = -1; }), Catch::Contains("--reduction"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.settings.reduction = std::nanf(""); }), Catch::Contains("--reduction"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.elevations = 0; }), Catch::Contains("--elevations"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.directions = -5; }), Catch::Contains("--directions"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.directory = ""; }), Catch::Contains("--output"));
+}
+
+TEST_CASE("fitter: tools end with the exit code that fits and say why in one line") {
+  const auto run = [](std::vector<std::string> arguments, const std::function<void()>& work) {
+    std::vector<char*> argv;
+    for (std::string& a : arguments) argv.push_back(a.data());
+    int number = 0;
+    return runTool(
+        "tool", "A tool.", static_cast<int>(argv.size()), argv.data(),
+        [&](CLI::App& app) { app.add_option("--number", number, "A number"); }, work);
+  };
+  const auto nothing = [] {};
+  CHECK(run({"tool"}, nothing) == 0);
+  CHECK(run({"tool", "--number", "3"}, nothing) == 0);
+  CHECK(run({"tool", "--number", "x"}, nothing) == 2);
+  CHECK(run({"tool", "--unknown"}, nothing) == 2);
+  CHECK(run({"tool"}, [] { throw UsageError("no"); }) == 2);
+  CHECK(run({"tool"}, [] { throw std::runtime_error("failed"); }) == 1);
+}
