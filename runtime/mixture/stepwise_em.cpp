@@ -77,12 +77,6 @@ class StepwiseEm::Sweep {
   int count_;
   float background_;
 };
-float background_;
-double totalWeight_, backgroundWeight_;
-// Of the E step: means, the inverse Cholesky factor's parts, and (1−u) π / (2π sqrt|Σ|).
-alignas(64) std::array<float, lanes> x_{}, y_{}, slope_{}, along_{}, across_{}, scale_{};
-alignas(64) std::array<double, lanes> g_{}, sx_{}, sy_{}, cxx_{}, cxy_{}, cyy_{};
-};
 
 template <int lanes>
 StepwiseEm::Sweep<lanes>::Sweep(const StepwiseEm& em)
