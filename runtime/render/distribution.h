@@ -30,7 +30,8 @@ class DiscreteDistribution {
     const double target = low + u * (cumulative_[last - 1] - low);
     const auto begin = cumulative_.begin();
     const auto found = std::upper_bound(begin + first, begin + last, target);
-    const std::size_t i = std::min<std::size_t>(found - begin, lastPositive(last));
+    auto i = static_cast<std::size_t>(found - begin);
+    if (i == last) i = lastPositive(last);
     const double below = i > 0 ? cumulative_[i - 1] : 0.0;
     u = std::clamp(static_cast<float>((target - below) / (cumulative_[i] - below)), 0.0f, kOneMinusEpsilon);
     return i;
