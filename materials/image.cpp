@@ -10,11 +10,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <limits>
 #include <memory>
 #include <stdexcept>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -141,9 +141,35 @@ struct FreePixels {
 template <class T>
 using Pixels = std::unique_ptr<T, FreePixels>;
 
-struct CloseFile {
-  void operator()(std::FILE* file) const { std::fclose(file); }
+/// The file as stb_image takes it, to find out whether it asks for more than there is: JPEG and TGA files cut short
+/// would pass for whole ones, and an HDR file would be read for ever, zeros being all that follows its end. So some
+/// ones follow.
+struct Source {
+  std::string_view rest;
+  std::int64_t padding;
+  bool exhausted = false;
+
+  static int read(void* user, char* out, int size) {
+    Source& source = *static_cast<Source*>(user);
+    const std::size_t n = std::min(source.rest.size(), static_cast<std::size_t>(size));
+    std::copy_n(source.rest.data(), n, out);
+    source.rest.remove_prefix(n);
+    if (n > 0) return static_cast<int>(n);
+    source.exhausted = true;
+    const auto ones = static_cast<int>(std::min<std::int64_t>(source.padding, size));
+    source.padding -= ones;
+    std::fill_n(out, ones, '\1');
+    return ones;
+  }
+  static void skip(void* user, int size) {
+    Source& source = *static_cast<Source*>(user);
+    const auto n = static_cast<std::size_t>(std::max(0, size));
+    if (n > source.rest.size()) source.exhausted = true;
+    source.rest.remove_prefix(std::min(n, source.rest.size()));
+  }
+  static int eof(void* user) { return static_cast<Source*>(user)->rest.empty(); }
 };
+constexpr stbi_io_callbacks kSourceCallbacks = {Source::read, Source::skip, Source::eof};
 
 /// The pixels of an integer format by a table of what each code means.
 template <class T>
@@ -159,30 +185,55 @@ Image decodeCodes(const T* codes, int width, int height, const Encoding& encodin
   return image;
 }
 
-Image readOther(const std::filesystem::path& path, const Encoding& encoding) {
-  const std::unique_ptr<std::FILE, CloseFile> file(std::fopen(path.c_str(), "rb"));
-  if (!file) fail(path, "cannot open");
-  int width = 0, height = 0, channels = 0;
-  if (!stbi_info_from_file(file.get(), &width, &height, &channels))
-    fail(path, fmt::format("not an image that can be read ({})", stbi_failure_reason()));
-  checkSize(path, width, height);
-  const auto damaged = [&path] { fail(path, fmt::format("damaged image ({})", stbi_failure_reason())); };
+struct Size {
+  int width = 0, height = 0;
+};
 
-  if (stbi_is_hdr_from_file(file.get())) {
-    const Pixels<float> pixels(stbi_loadf_from_file(file.get(), &width, &height, &channels, 3));
-    if (!pixels) damaged();
-    Image image(width, height);
-    std::copy_n(pixels.get(), image.pixels.size() * 3, image.pixels.data()->data());
-    return image;
+/// Loads by one of stb_image's functions, three channels a pixel.
+template <class T, class Load>
+Pixels<T> loadPixels(const std::filesystem::path& path, std::string_view bytes, std::int64_t padding, Load load,
+                     Size& size) {
+  Source source{bytes, padding};
+  int channels = 0;
+  Pixels<T> pixels(load(&kSourceCallbacks, &source, &size.width, &size.height, &channels, 3));
+  if (source.exhausted) fail(path, "damaged image (it ends too early)");
+  if (!pixels) fail(path, fmt::format("damaged image ({})", stbi_failure_reason()));
+  return pixels;
+}
+
+Image readHdr(const std::filesystem::path& path, std::string_view bytes, Size size) {
+  // A run-length coded pixel takes at most eight bytes, and the line it is in four more.
+  const std::int64_t padding = std::int64_t{16} * size.width * size.height;
+  const Pixels<float> pixels = loadPixels<float>(path, bytes, padding, stbi_loadf_from_callbacks, size);
+  Image image(size.width, size.height);
+  std::copy_n(pixels.get(), image.pixels.size() * 3, image.pixels.data()->data());
+  return image;
+}
+
+std::string readBytes(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string bytes(std::filesystem::file_size(path), '\0');
+  if (!file || !file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()))) fail(path, "cannot read");
+  if (bytes.size() > static_cast<std::size_t>(std::numeric_limits<int>::max())) fail(path, "too large a file");
+  return bytes;
+}
+
+Image readOther(const std::filesystem::path& path, const Encoding& encoding) {
+  const std::string bytes = readBytes(path);
+  const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
+  const int length = static_cast<int>(bytes.size());
+  Size size;
+  int channels = 0;
+  if (!stbi_info_from_memory(data, length, &size.width, &size.height, &channels))
+    fail(path, fmt::format("not an image that can be read ({})", stbi_failure_reason()));
+  checkSize(path, size.width, size.height);
+  if (stbi_is_hdr_from_memory(data, length)) return readHdr(path, bytes, size);
+  if (stbi_is_16_bit_from_memory(data, length)) {
+    const Pixels<stbi_us> pixels = loadPixels<stbi_us>(path, bytes, 0, stbi_load_16_from_callbacks, size);
+    return decodeCodes(pixels.get(), size.width, size.height, encoding);
   }
-  if (stbi_is_16_bit_from_file(file.get())) {
-    const Pixels<stbi_us> pixels(stbi_load_from_file_16(file.get(), &width, &height, &channels, 3));
-    if (!pixels) damaged();
-    return decodeCodes(pixels.get(), width, height, encoding);
-  }
-  const Pixels<stbi_uc> pixels(stbi_load_from_file(file.get(), &width, &height, &channels, 3));
-  if (!pixels) damaged();
-  return decodeCodes(pixels.get(), width, height, encoding);
+  const Pixels<stbi_uc> pixels = loadPixels<stbi_uc>(path, bytes, 0, stbi_load_from_callbacks, size);
+  return decodeCodes(pixels.get(), size.width, size.height, encoding);
 }
 
 bool startsLikeExr(const std::filesystem::path& path) {

@@ -239,6 +239,29 @@ TEST_CASE("materials: damaged images are refused by name") {
   REQUIRE_THAT(faultOf([&] { readImage(folder / "."); }), Contains("not a file"));
 }
 
+TEST_CASE("materials: images cut short are refused whatever the format") {
+  const Folder folder;
+  std::vector<std::uint8_t> noise(64 * 64 * 3);
+  for (std::size_t i = 0; i < noise.size(); ++i) noise[i] = static_cast<std::uint8_t>(i * i / 7);
+  const std::vector<float> steps(64 * 64 * 3, 0.5f), narrow(4 * 400 * 3, 0.5f);
+  const auto name = [&folder](const char* file) { return (folder / file).string(); };
+  REQUIRE(stbi_write_png(name("a.png").c_str(), 64, 64, 3, noise.data(), 192));
+  REQUIRE(stbi_write_jpg(name("a.jpg").c_str(), 64, 64, 3, noise.data(), 90));
+  REQUIRE(stbi_write_bmp(name("a.bmp").c_str(), 64, 64, 3, noise.data()));
+  REQUIRE(stbi_write_tga(name("a.tga").c_str(), 64, 64, 3, noise.data()));
+  REQUIRE(stbi_write_hdr(name("coded.hdr").c_str(), 64, 64, 3, steps.data()));
+  REQUIRE(stbi_write_hdr(name("plain.hdr").c_str(), 4, 400, 3, narrow.data()));  // too narrow for run lengths
+  for (const char* file : {"a.png", "a.jpg", "a.bmp", "a.tga", "coded.hdr", "plain.hdr"}) {
+    CAPTURE(file);
+    const std::string bytes = bytesOf(name(file));
+    REQUIRE_NOTHROW(readImage(name(file)));
+    for (const double share : {0.001, 0.1, 0.5, 0.9}) {
+      const std::string cut = bytes.substr(0, static_cast<std::size_t>(share * bytes.size()));
+      REQUIRE_THAT(faultOf([&] { readImage(folder.write(std::string("cut-") + file, cut)); }), Contains("cut-"));
+    }
+  }
+}
+
 TEST_CASE("materials: flipped bits in an EXR file never crash") {
   const Folder folder;
   const fs::path exr = folder / "whole.exr";
