@@ -101,7 +101,7 @@ void printReports(const std::vector<CacheReport>& reports, bool showRun, std::FI
     header.insert(header.begin(), "material");
     header.insert(header.end() - 1, "seconds");
   }
-  Table table(header);
+  Table table(header, showRun ? 2 : 1);
   for (const CacheReport& r : reports) {
     const CacheSummary& s = r.summary;
     std::vector<std::string> cells{r.lobe,

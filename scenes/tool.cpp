@@ -113,7 +113,7 @@ void Progress::print(Clock::time_point now) {
   drawn_ = width;
 }
 
-Table::Table(std::vector<std::string> header) {
+Table::Table(std::vector<std::string> header, std::size_t leftColumns) : leftColumns_(leftColumns) {
   rows_.push_back(std::move(header));
 }
 
@@ -129,7 +129,7 @@ void Table::print(std::FILE* out) const {
     std::string line;
     for (std::size_t i = 0; i < row.size(); ++i) {
       const std::string padding(widths[i] - displayWidth(row[i]), ' ');
-      line += i == 0 ? row[i] + padding : "  " + padding + row[i];
+      line += (i == 0 ? "" : "  ") + (i < leftColumns_ ? row[i] + padding : padding + row[i]);
     }
     line.erase(line.find_last_not_of(' ') + 1);
     fmt::print(out, "{}\n", line);

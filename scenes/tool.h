@@ -61,16 +61,17 @@ class Progress {
   Clock::time_point next_;
 };
 
-/// Columns of text aligned by the widest cell: the first to the left, the others to the right.
+/// Columns of text aligned by the widest cell: the first leftColumns to the left, the others to the right.
 class Table {
  public:
-  explicit Table(std::vector<std::string> header);
+  explicit Table(std::vector<std::string> header, std::size_t leftColumns = 1);
   /// As many cells as the header has.
   void add(std::vector<std::string> cells);
   void print(std::FILE* out) const;
 
  private:
   std::vector<std::vector<std::string>> rows_;
+  std::size_t leftColumns_;
 };
 
 }  // namespace lobe

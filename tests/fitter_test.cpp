@@ -1,13 +1,17 @@
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <numbers>
 
 #include <tbb/global_control.h>
+#include <nlohmann/json.hpp>
 
 #include "fitter/cache_mixture.h"
 #include "fitter/compile.h"
@@ -421,6 +425,92 @@ TEST_CASE("fitter: options out of range are named") {
   CHECK_THAT(fault([](CompileOptions& o) { o.elevations = 0; }), Catch::Contains("--elevations"));
   CHECK_THAT(fault([](CompileOptions& o) { o.directions = -5; }), Catch::Contains("--directions"));
   CHECK_THAT(fault([](CompileOptions& o) { o.directory = ""; }), Catch::Contains("--output"));
+}
+
+namespace {
+
+struct ToolResult {
+  int code;
+  std::string out, error;
+};
+
+/// Runs one of our binaries with its output caught in the folder.
+ToolResult runBinary(const fs::path& folder, const std::string& arguments) {
+  const fs::path out = folder / "out", error = folder / "error";
+  const std::string command = "cd " + folder.string() + " && " + LOBE_BIN_DIR "/" + arguments + " >out 2>error";
+  const int status = std::system(command.c_str());
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, readFile(out), readFile(error)};
+}
+
+long lineCount(const std::string& text) {
+  return std::ranges::count(text, '\n');
+}
+
+const char* const kTwoMaterials = R"(<scene version="0.6.0">
+  <bsdf type="roughconductor" id="Steel"><string name="distribution" value="ggx"/>
+    <float name="alpha" value="$roughness"/></bsdf>
+  <bsdf type="roughconductor" id="Again"><string name="distribution" value="ggx"/>
+    <float name="alpha" value="0.3"/></bsdf>
+  <shape type="sphere"><ref id="Steel"/></shape>
+  <shape type="sphere"><ref id="Again"/></shape>
+  <shape type="sphere"><bsdf type="diffuse"/></shape>
+</scene>)";
+
+}  // namespace
+
+TEST_CASE("fitter: lobefit compiles a scene, then has nothing to do; lobedump shows what it made") {
+  const TemporaryFolder folder;
+  writeAtomically(folder.path / "scene.xml", std::string(kTwoMaterials));
+  const std::string fit = "lobefit scene.xml -D roughness=0.3 --elevations 4 --samples 256";
+  ToolResult r = runBinary(folder.path, fit + " --json");
+  CHECK(r.code == 0);
+  CHECK_THAT(r.error, Catch::Contains("1 of 1 lobes written to lobes"));
+  const auto json = nlohmann::json::parse(r.out);
+  REQUIRE(json.size() == 1);
+  CHECK(json[0]["materials"] == nlohmann::json({"Steel", "Again"}));
+  CHECK(json[0]["records"] == 4);
+  r = runBinary(folder.path, fit);
+  CHECK(r.code == 0);
+  CHECK_THAT(r.error, Catch::Contains("nothing to do"));
+  CHECK_THAT(r.out, Catch::Contains("Steel + 1 more") && Catch::Contains("up to date"));
+
+  r = runBinary(folder.path, "lobedump lobes/*.lobe --records");
+  CHECK(r.code == 0);
+  CHECK(lineCount(r.out) == 6 + 5 + 1 + 2);  // header, records, gap, table
+  r = runBinary(folder.path, "lobedump --json lobes/*.lobe");
+  CHECK(nlohmann::json::parse(r.out)[0]["records"].size() == 4);
+}
+
+TEST_CASE("fitter: tools refuse bad input with one line") {
+  const TemporaryFolder folder;
+  writeAtomically(folder.path / "scene.xml", std::string(kTwoMaterials));
+  writeAtomically(folder.path / "broken.xml", std::string("<scene><bsdf type='diffuse'></scene>"));
+  writeAtomically(folder.path / "no.lobe", std::string("something else"));
+  writeAtomically(folder.path / "empty.lobe", std::string());
+  const std::pair<const char*, int> cases[] = {{"lobefit", 2},
+                                               {"lobefit scene.xml --components 0 -D roughness=1", 2},
+                                               {"lobefit scene.xml --samples many", 2},
+                                               {"lobefit scene.xml --threads 0", 2},
+                                               {"lobefit scene.xml -D roughness", 2},
+                                               {"lobefit scene.xml --plot", 2},
+                                               {"lobefit scene.xml", 1},  // $roughness is not defined
+                                               {"lobefit missing.xml", 1},
+                                               {"lobefit broken.xml", 1},
+                                               {"lobefit scene.xml -D roughness=0.3 -o scene.xml/x", 1},
+                                               {"lobedump", 2},
+                                               {"lobedump missing.lobe", 1},
+                                               {"lobedump no.lobe", 1},
+                                               {"lobedump empty.lobe", 1},
+                                               {"lobedump .", 1}};
+  for (const auto& [arguments, code] : cases) {
+    const ToolResult r = runBinary(folder.path, arguments);
+    CAPTURE(arguments, r.error);
+    CHECK(r.code == code);
+    CHECK(lineCount(r.error) == 1);
+    CHECK_THAT(r.error, Catch::Contains(": error: "));
+    CHECK(r.out.empty());
+  }
+  CHECK(!fs::exists(folder.path / "lobes"));
 }
 
 TEST_CASE("fitter: tools end with the exit code that fits and say why in one line") {
