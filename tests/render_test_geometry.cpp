@@ -18,26 +18,6 @@ Vec3 randomDirection(Rng& rng, const Vec3& side) {
   return d.dot(side) < 0 ? Vec3(-d) : d;
 }
 
-// A mesh of a sphere: triangles at all angles.
-TriangleMesh sphereMesh(const Vec3& centre, float radius, int rings) {
-  TriangleMesh mesh;
-  for (int i = 0; i <= rings; ++i)
-    for (int j = 0; j <= 2 * rings; ++j) {
-      const float theta = kPi * i / rings, phi = kPi * j / rings;
-      const Vec3 n(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta));
-      mesh.positions.push_back(centre + radius * n);
-      mesh.normals.push_back(n);
-    }
-  const auto stride = static_cast<std::uint32_t>(2 * rings + 1);
-  for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(rings); ++i)
-    for (std::uint32_t j = 0; j + 1 < stride; ++j) {
-      const std::uint32_t a = i * stride + j, b = a + stride;
-      mesh.triangles.push_back({a, b, b + 1});
-      mesh.triangles.push_back({a, b + 1, a + 1});
-    }
-  return mesh;
-}
-
 SurfaceHit hitOf(const Scene& scene, const Ray& ray) {
   const RayTracer tracer(scene);
   const auto hit = tracer.trace(ray);

@@ -2,7 +2,12 @@
 // Scenes made in code, plain materials and statistics for the render tests.
 
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
 #include <memory>
+#include <string>
+
+#include <unistd.h>
 
 #include <catch2/catch.hpp>
 
@@ -68,6 +73,26 @@ inline TriangleMesh box(const Vec3& low, const Vec3& high, bool inward) {
   return mesh;
 }
 
+/// A mesh of a sphere, with the sphere's normals: triangles at all angles.
+inline TriangleMesh sphereMesh(const Vec3& centre, float radius, int rings) {
+  TriangleMesh mesh;
+  for (int i = 0; i <= rings; ++i)
+    for (int j = 0; j <= 2 * rings; ++j) {
+      const float theta = kPi * i / rings, phi = kPi * j / rings;
+      const Vec3 n(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta));
+      mesh.positions.push_back(centre + radius * n);
+      mesh.normals.push_back(n);
+    }
+  const auto stride = static_cast<std::uint32_t>(2 * rings + 1);
+  for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(rings); ++i)
+    for (std::uint32_t j = 0; j + 1 < stride; ++j) {
+      const std::uint32_t a = i * stride + j, b = a + stride;
+      mesh.triangles.push_back({a, b, b + 1});
+      mesh.triangles.push_back({a, b + 1, a + 1});
+    }
+  return mesh;
+}
+
 inline int addMaterial(Scene& scene, BsdfPtr bsdf) {
   scene.materials.push_back({"test", std::move(bsdf)});
   return static_cast<int>(scene.materials.size()) - 1;
@@ -123,5 +148,25 @@ inline Moments estimate(const Integrator& integrator, const Ray& ray, int n, std
   }
   return moments;
 }
+
+/// A folder of a test's own, removed with everything in it.
+class Folder {
+ public:
+  Folder() {
+    std::string name = (std::filesystem::temp_directory_path() / "lobe-render-XXXXXX").string();
+    REQUIRE(mkdtemp(name.data()) != nullptr);
+    path_ = name;
+  }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  ~Folder() { std::filesystem::remove_all(path_); }
+  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+  long files() const {
+    return std::distance(std::filesystem::directory_iterator(path_), std::filesystem::directory_iterator());
+  }
+
+ private:
+  std::filesystem::path path_;
+};
 
 }  // namespace lobe::test

@@ -20,19 +20,22 @@ float sampleTent(float u) {
 }  // namespace
 
 EnvironmentLight::EnvironmentLight(const Environment& environment)
-    : image_(environment.radiance), toWorld_(environment.toWorld) {
-  for (Rgb& pixel : image_.pixels) pixel = usable(pixel);
+    : width_(environment.radiance.width), height_(environment.radiance.height), toWorld_(environment.toWorld) {
   std::vector<float> rowWeights;
-  std::vector<float> weights(image_.width);
-  for (int y = 0; y < image_.height; ++y) {
-    sines_.push_back(std::sin(kPi * (y + 0.5f) / image_.height));
-    for (int x = 0; x < image_.width; ++x) weights[x] = weight(x, y);
+  std::vector<float> weights(width_);
+  for (int y = 0; y < height_; ++y) {
+    const float sine = std::sin(kPi * (y + 0.5f) / height_);
+    for (int x = 0; x < width_; ++x) {
+      const Rgb radiance = usable(environment.radiance.at(x, y));
+      weights[x] = luminance(radiance) * sine;
+      texels_.push_back({radiance.x(), radiance.y(), radiance.z(), weights[x]});
+    }
     rows_.emplace_back(weights);
     rowWeights.push_back(static_cast<float>(rows_.back().total()));
   }
   columns_ = DiscreteDistribution(rowWeights);
-  const double pixelArea = 2.0 * kPi * kPi / (static_cast<double>(image_.width) * image_.height);
-  flux_ = constant() ? 4.0 * kPi * luminance(image_.pixels[0]) : columns_.total() * pixelArea;
+  const double pixelArea = 2.0 * kPi * kPi / static_cast<double>(texels_.size());
+  flux_ = constant() ? 4.0 * kPi * luminance(texels_[0].head<3>()) : columns_.total() * pixelArea;
 }
 
 EnvironmentLight::Coordinates EnvironmentLight::coordinates(const Vec3& direction) const {
@@ -40,71 +43,70 @@ EnvironmentLight::Coordinates EnvironmentLight::coordinates(const Vec3& directio
   const float sine = std::sqrt(d.x() * d.x() + d.z() * d.z());
   const float u = std::atan2(d.x(), -d.z()) * (0.5f * kInvPi);
   const float v = std::atan2(sine, d.y()) * kInvPi;
-  return {{(u < 0.0f ? u + 1.0f : u) * image_.width, v * image_.height}, sine};
+  return {{(u < 0.0f ? u + 1.0f : u) * width_, v * height_}, sine};
 }
 
 Eigen::Vector2i EnvironmentLight::pixelOf(const Vec3& direction) const {
   const Vec2 p = coordinates(direction).point;
-  return {std::min(static_cast<int>(p.x()), image_.width - 1), std::min(static_cast<int>(p.y()), image_.height - 1)};
+  return {std::min(static_cast<int>(p.x()), width_ - 1), std::min(static_cast<int>(p.y()), height_ - 1)};
 }
 
-// Columns wrap around, rows end at the poles. value(x, y) is what a pixel holds.
-template <class Value>
-auto EnvironmentLight::interpolate(const Vec2& point, const Value& value) const {
+// Columns wrap around, rows end at the poles. Pixels outside the block have no weight.
+EnvironmentLight::Texel EnvironmentLight::interpolate(const Vec2& point, const PixelBlock& block) const {
   const float px = point.x() - 0.5f;
   const float py = point.y() - 0.5f;
   const float floorX = std::floor(px);
   const float floorY = std::floor(py);
   const float fx = px - floorX;
   const float fy = py - floorY;
-  const int left = (static_cast<int>(floorX) + image_.width) % image_.width;
-  const int right = left + 1 == image_.width ? 0 : left + 1;
-  const int top = std::clamp(static_cast<int>(floorY), 0, image_.height - 1);
-  const int bottom = std::clamp(static_cast<int>(floorY) + 1, 0, image_.height - 1);
-  using Result = std::decay_t<decltype(value(0, 0))>;
-  return Result((1.0f - fy) * ((1.0f - fx) * value(left, top) + fx * value(right, top)) +
-                fy * ((1.0f - fx) * value(left, bottom) + fx * value(right, bottom)));
+  const int left = floorX < 0.0f ? width_ - 1 : std::min(static_cast<int>(floorX), width_ - 1);
+  const int right = left + 1 == width_ ? 0 : left + 1;
+  const int top = std::clamp(static_cast<int>(floorY), 0, height_ - 1);
+  const int bottom = std::clamp(static_cast<int>(floorY) + 1, 0, height_ - 1);
+  const auto value = [&](int x, int y) {
+    Texel result = texel(x, y);
+    if (x < block.x0 || x >= block.x1 || y < block.y0 || y >= block.y1) result.w() = 0.0f;
+    return result;
+  };
+  return (1.0f - fy) * ((1.0f - fx) * value(left, top) + fx * value(right, top)) +
+         fy * ((1.0f - fx) * value(left, bottom) + fx * value(right, bottom));
 }
 
 Vec3 EnvironmentLight::direction(const Coordinates& c) const {
-  const float azimuth = 2.0f * kPi * c.point.x() / image_.width;
-  const float polar = kPi * c.point.y() / image_.height;
+  const float azimuth = 2.0f * kPi * c.point.x() / width_;
+  const float polar = kPi * c.point.y() / height_;
   return toWorld_ * Vec3(std::sin(azimuth) * c.sine, std::cos(polar), -std::cos(azimuth) * c.sine);
 }
 
-Rgb EnvironmentLight::radiance(const Coordinates& c) const {
-  return interpolate(c.point, [&](int x, int y) -> const Rgb& { return image_.at(x, y); });
-}
-
 Rgb EnvironmentLight::radiance(const Vec3& direction) const {
-  return constant() ? image_.pixels[0] : radiance(coordinates(direction));
+  if (constant()) return texels_[0].head<3>();
+  return interpolate(coordinates(direction).point, everything()).head<3>();
 }
 
 double EnvironmentLight::blockWeight(const PixelBlock& block) const {
-  if (block.x0 == 0 && block.x1 == image_.width) return columns_.mass(block.y0, block.y1);
+  if (block.x0 == 0 && block.x1 == width_) return columns_.mass(block.y0, block.y1);
   double sum = 0;
   for (int y = block.y0; y < block.y1; ++y) sum += rows_[y].mass(block.x0, block.x1);
   return sum;
 }
 
 int EnvironmentLight::sampleRow(const PixelBlock& block, float& u) const {
-  if (block.x0 == 0 && block.x1 == image_.width) return static_cast<int>(columns_.sample(u, block.y0, block.y1));
+  if (block.x0 == 0 && block.x1 == width_) return static_cast<int>(columns_.sample(u, block.y0, block.y1));
   std::vector<float> masses;
   for (int y = block.y0; y < block.y1; ++y) masses.push_back(static_cast<float>(rows_[y].mass(block.x0, block.x1)));
   return block.y0 + static_cast<int>(DiscreteDistribution(masses).sample(u));
 }
 
-float EnvironmentLight::pdf(const PixelBlock& block, const Coordinates& c) const {
-  const float w = interpolate(c.point, [&](int x, int y) {
-    const bool inside = x >= block.x0 && x < block.x1 && y >= block.y0 && y < block.y1;
-    return inside ? weight(x, y) : 0.0f;
-  });
-  const double imageDensity = w * image_.pixels.size() / blockWeight(block);
-  return c.sine > 0.0f ? static_cast<float>(imageDensity / (2.0 * kPi * kPi * c.sine)) : 0.0f;
+// From interpolated weight to density over solid angle.
+float EnvironmentLight::density(float weight, float sine, const PixelBlock& block) const {
+  if (sine <= 0.0f) return 0.0f;
+  return static_cast<float>(weight * texels_.size() / (blockWeight(block) * 2.0 * kPi * kPi * sine));
 }
 
 float EnvironmentLight::pdf(const PixelBlock& block, const Vec3& direction) const {
-  return constant() ? 0.25f * kInvPi : pdf(block, coordinates(direction));
+  if (constant()) return 0.25f * kInvPi;
+  const Coordinates c = coordinates(direction);
+  return density(interpolate(c.point, block).w(), c.sine, block);
 }
 
 float EnvironmentLight::pdf(const Vec3& direction) const {
@@ -116,19 +118,20 @@ std::optional<EnvironmentSample> EnvironmentLight::sample(const Vec2& u) const {
 }
 
 std::optional<EnvironmentSample> EnvironmentLight::sample(const PixelBlock& block, const Vec2& u) const {
-  if (constant()) return EnvironmentSample{squareToSphere(u), image_.pixels[0], 0.25f * kInvPi};
+  if (constant()) return EnvironmentSample{squareToSphere(u), texels_[0].head<3>(), 0.25f * kInvPi};
   Vec2 rest = u;
   const int y = sampleRow(block, rest.y());
   const auto x = static_cast<int>(rows_[y].sample(rest.x(), block.x0, block.x1));
   // A pixel's share of the interpolated image is a tent about its centre: around the seam, back at the poles.
   Coordinates c{{x + 0.5f + sampleTent(rest.x()), y + 0.5f + sampleTent(rest.y())}, 0.0f};
-  if (c.point.x() < 0.0f) c.point.x() += image_.width;
-  if (c.point.x() >= image_.width) c.point.x() -= image_.width;
-  c.point.y() = c.point.y() > image_.height ? 2.0f * image_.height - c.point.y() : std::abs(c.point.y());
-  c.sine = std::sin(kPi * c.point.y() / image_.height);
-  const float density = c.sine > 0.0f ? pdf(block, c) : 0.0f;
-  if (!(density > 0.0f)) return std::nullopt;
-  return EnvironmentSample{direction(c), radiance(c), density};
+  if (c.point.x() < 0.0f) c.point.x() += width_;
+  if (c.point.x() >= width_) c.point.x() -= width_;
+  c.point.y() = c.point.y() > height_ ? 2.0f * height_ - c.point.y() : std::abs(c.point.y());
+  c.sine = std::sin(kPi * c.point.y() / height_);
+  const Texel found = interpolate(c.point, block);
+  const float pdf = density(found.w(), c.sine, block);
+  if (!(pdf > 0.0f)) return std::nullopt;
+  return EnvironmentSample{direction(c), found.head<3>(), pdf};
 }
 
 }  // namespace lobe

@@ -42,10 +42,10 @@ class EnvironmentLight {
   float pdf(const PixelBlock& block, const Vec3& direction) const;
   double blockWeight(const PixelBlock& block) const;
 
-  int width() const { return image_.width; }
-  int height() const { return image_.height; }
+  int width() const { return width_; }
+  int height() const { return height_; }
   /// luminance × sinθ of a pixel.
-  float weight(int x, int y) const { return luminance(image_.at(x, y)) * sines_[y]; }
+  float weight(int x, int y) const { return texel(x, y).w(); }
   /// The pixel that a direction falls into.
   Eigen::Vector2i pixelOf(const Vec3& direction) const;
 
@@ -54,20 +54,21 @@ class EnvironmentLight {
     Vec2 point;  // in pixels
     float sine;
   };
+  using Texel = Eigen::Array4f;  // radiance, then weight
+
+  const Texel& texel(int x, int y) const { return texels_[static_cast<std::size_t>(y) * width_ + x]; }
+  bool constant() const { return texels_.size() == 1; }
+  PixelBlock everything() const { return {0, 0, width_, height_}; }
+
   Coordinates coordinates(const Vec3& direction) const;
   Vec3 direction(const Coordinates& c) const;
+  Texel interpolate(const Vec2& point, const PixelBlock& block) const;
+  float density(float weight, float sine, const PixelBlock& block) const;
   int sampleRow(const PixelBlock& block, float& u) const;
-  float pdf(const PixelBlock& block, const Coordinates& c) const;
-  Rgb radiance(const Coordinates& c) const;
-  bool constant() const { return image_.pixels.size() == 1; }
-  PixelBlock everything() const { return {0, 0, image_.width, image_.height}; }
 
-  template <class Value>
-  auto interpolate(const Vec2& point, const Value& value) const;
-
-  Image image_;
+  int width_, height_;
+  std::vector<Texel> texels_;
   Eigen::Matrix3f toWorld_;
-  std::vector<float> sines_;
   std::vector<DiscreteDistribution> rows_;
   DiscreteDistribution columns_;  // over rows: the weights of rows_
   double flux_ = 0;

@@ -1,0 +1,78 @@
+// lobecompare as its users see it: output, exit codes, one-line errors.
+
+#include <cstdio>
+#include <filesystem>
+#include <string>
+
+#include <fmt/format.h>
+#include <sys/wait.h>
+#include <nlohmann/json.hpp>
+
+#include "render_test_tools.h"
+#include "runtime/render/image_output.h"
+
+using namespace lobe;
+using namespace lobe::test;
+
+namespace {
+
+struct ToolRun {
+  int code;
+  std::string output;  // stdout and stderr
+};
+
+ToolRun lobecompare(const std::string& arguments) {
+  const std::string command = fmt::format("{}/lobecompare {} 2>&1", LOBE_BIN_DIR, arguments);
+  std::FILE* pipe = popen(command.c_str(), "r");
+  REQUIRE(pipe);
+  std::string output;
+  char buffer[4096];
+  while (const std::size_t n = std::fread(buffer, 1, sizeof buffer, pipe)) output.append(buffer, n);
+  const int status = pclose(pipe);
+  return {WEXITSTATUS(status), output};
+}
+
+}  // namespace
+
+TEST_CASE("render: lobecompare tells errors to people and machines") {
+  const Folder folder;
+  const std::string reference = folder / "reference.exr", image = folder / "image.exr";
+  writeImage(reference, Image(10, 10, grey(0.5f)));
+  writeImage(image, Image(10, 10, grey(0.6f)));
+  SECTION("numbers") {
+    const ToolRun run = lobecompare(reference + " " + image + " " + reference + " --json");
+    REQUIRE(run.code == 0);
+    const auto json = nlohmann::json::parse(run.output);
+    REQUIRE(json.size() == 2);
+    CHECK(json[0]["image"] == image);
+    CHECK(json[0]["mse"].get<double>() == Approx(0.01));
+    CHECK(json[0]["relmse"].get<double>() == Approx(0.01 / 0.26));
+    CHECK(json[0]["relmse_drop_0.1pct"].get<double>() == Approx(0.01 / 0.26));
+    CHECK(json[0]["relmse_drop_1pct"].get<double>() == Approx(0.01 / 0.26));
+    CHECK(json[0]["mean_ratio"].get<double>() == Approx(1.2));
+    CHECK(json[0]["nonfinite"] == 0);
+    CHECK(json[1]["mse"] == 0);
+    CHECK(lobecompare(reference + " " + image).output.find("0.01") != std::string::npos);
+  }
+  SECTION("map") {
+    const std::string map = folder / "map.png";
+    CHECK(lobecompare(reference + " " + image + " --map " + map).code == 0);
+    CHECK(readImage(map).width == 10);
+    CHECK(lobecompare(reference + " " + image + " " + image + " --map " + map).code == 2);
+    CHECK(lobecompare(reference + " " + image + " --map map.jpg").code == 2);
+  }
+  SECTION("faults") {
+    CHECK(lobecompare("").code == 2);
+    CHECK(lobecompare(reference).code == 2);
+    CHECK(lobecompare(reference + " " + image + " --unknown").code == 2);
+    const std::string other = folder / "other.exr";
+    writeImage(other, Image(9, 10));
+    const ToolRun sizes = lobecompare(reference + " " + other);
+    CHECK(sizes.code == 1);
+    CHECK(sizes.output ==
+          fmt::format("lobecompare: error: {}: the image has 9x10 pixels, the reference 10x10\n", other));
+    const ToolRun missing = lobecompare(reference + " " + (folder / "missing.exr").string());
+    CHECK(missing.code == 1);
+    CHECK(missing.output.find("missing.exr") != std::string::npos);
+  }
+}
