@@ -425,7 +425,7 @@ TEST_CASE("scenes: missing normals are averaged by angle unless flat ones are as
   // A corner of a cube: three squares, one of them in two triangles that must not count twice.
   const fs::path path = folder.write("corner.obj",
                                      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\n"
-                                     "f 1 2 3\nf 1 3 4\nf 1 5 6 2\nf 1 4 7 5\n");
+                                     "f 1 2 3\nf 1 3 4\nf 5 6 2 1\nf 7 5 1 4\n");
   const TriangleMesh smooth = readObj(path, {});
   REQUIRE(smooth.normals.size() == smooth.positions.size());
   requireNear(smooth.normals[0], Vec3(1, 1, 1).normalized());
