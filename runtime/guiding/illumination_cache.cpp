@@ -7,8 +7,8 @@ namespace lobe {
 namespace {
 
 constexpr float kMinNormalCosine = 0.75f;  // about 41°
-// Cells of half the largest radius: a record lies in few of them, and a cell holds few records.
-constexpr float kCellsPerUnit = 2.0f;
+// Cells of the largest radius: a record lies in few of them, and a cell holds few records.
+constexpr float kCellsPerUnit = 1.0f;
 
 Eigen::Vector3i cellOf(const Vec3& x, float inverseCellSize) {
   return (x * inverseCellSize).array().floor().cast<int>();

@@ -79,13 +79,25 @@ class ConvergenceLog {
   std::string text_;
 };
 
+/// The caches and what was learnt; neither for `path`. Not moved: the sampler refers to the others.
+struct Guiding {
+  Guiding() = default;
+  Guiding(const Guiding&) = delete;
+  Guiding& operator=(const Guiding&) = delete;
+
+  std::optional<BrdfCaches> caches;
+  TrainedIllumination training;
+  std::optional<GuidedSampler> sampler;
+};
+
 /// What a run leaves besides the picture.
 struct RunResult {
   RenderResult render;
-  TrainedIllumination training;
-  std::size_t lobeBytes = 0;
-  std::vector<std::uint64_t> cacheHashes;
-  std::uint64_t dropped = 0;
+  const Guiding& guiding;
+  std::uint64_t dropped;
+
+  const TrainingReport& training() const { return guiding.training.report; }
+  double seconds() const { return training().seconds + render.total.seconds; }
 };
 
 nlohmann::ordered_json statistics(const RenderJob& job, const RunResult& run) {
@@ -99,8 +111,8 @@ nlohmann::ordered_json statistics(const RenderJob& job, const RunResult& run) {
         decisions > 0 ? static_cast<double>(paths.strategies[i]) / static_cast<double>(decisions) : 0.0;
   return {{"integrator", nameOf(job.integrator)},
           {"seed", job.seed},
-          {"seconds_total", run.training.report.seconds + total.seconds},
-          {"seconds_training", run.training.report.seconds},
+          {"seconds_total", run.seconds()},
+          {"seconds_training", run.training().seconds},
           {"seconds_rendering", total.seconds},
           {"spp", total.samples},
           {"rays", paths.rays()},
@@ -108,12 +120,12 @@ nlohmann::ordered_json statistics(const RenderJob& job, const RunResult& run) {
           {"segments_per_second", static_cast<double>(paths.segments) / total.seconds},
           {"mean_path_length", static_cast<double>(paths.segments) / static_cast<double>(paths.paths)},
           {"peak_rss_bytes", peakResidentBytes()},
-          {"training_passes", run.training.report.passes},
-          {"training_particles", run.training.report.particles},
-          {"records", run.training.cache.records().size()},
-          {"records_undersampled_share", run.training.report.undersampledShare},
-          {"record_bytes", run.training.cache.bytes()},
-          {"lobe_bytes", run.lobeBytes},
+          {"training_passes", run.training().passes},
+          {"training_particles", run.training().particles},
+          {"records", run.guiding.training.cache.records().size()},
+          {"records_undersampled_share", run.training().undersampledShare},
+          {"record_bytes", run.guiding.training.cache.bytes()},
+          {"lobe_bytes", run.guiding.caches ? run.guiding.caches->bytes() : 0},
           {"strategy_shares", shares},
           {"nonfinite_samples", run.dropped}};
 }
@@ -122,19 +134,12 @@ ImageAttributes attributes(const RenderJob& job, const RunResult& run) {
   ImageAttributes all{{"software", fmt::format("Lobe {}", LOBE_VERSION)},
                       {"integrator", std::string(nameOf(job.integrator))},
                       {"seed", static_cast<double>(job.seed)},
-                      {"samples", static_cast<double>(run.render.total.samples)},
-                      {"cacheHashes", fmt::format("{:016x}", fmt::join(run.cacheHashes, " "))}};
+                      {"samples", static_cast<double>(run.render.total.samples)}};
+  if (run.guiding.caches) all["cacheHashes"] = fmt::format("{:016x}", fmt::join(run.guiding.caches->hashes(), " "));
   // A picture of so many samples is the same bytes on every run; one of so many seconds never is.
-  if (job.seconds) all["seconds"] = run.training.report.seconds + run.render.total.seconds;
+  if (job.seconds) all["seconds"] = run.seconds();
   return all;
 }
-
-/// The caches and what was learnt, or neither for `path`.
-struct Guiding {
-  std::optional<BrdfCaches> caches;
-  TrainedIllumination training;
-  std::optional<GuidedSampler> sampler;
-};
 
 void prepare(const RenderJob& job, const RenderScene& scene, const PinholeCamera& camera, Guiding& guiding) {
   if (job.integrator == IntegratorKind::path) return;
@@ -158,6 +163,18 @@ RenderOptions renderOptions(const RenderJob& job, double trained) {
   RenderOptions options{job.seed, job.samples, std::nullopt};
   if (job.seconds) options.seconds = std::max(*job.seconds - trained, 1e-3);
   return options;
+}
+
+RenderResult renderWithProgress(const RenderJob& job, const PinholeCamera& camera, const Integrator& integrator,
+                                double trained, Film& film, ConvergenceLog& log) {
+  Progress progress("rendering", job.samples ? *job.samples : *job.seconds - trained);
+  double done = 0;
+  return render(camera, integrator, film, renderOptions(job, trained), [&](const RenderProgress& p) {
+    const double now = job.samples ? p.samples : p.seconds;
+    progress.advance(now - done);
+    done = now;
+    log.add(film, trained + p.seconds, p.samples);
+  });
 }
 
 }  // namespace
@@ -195,27 +212,12 @@ void run(const RenderJob& job) {
   const PinholeCamera camera(scene.camera, scene.filter);
   prepare(job, renderScene, camera, guiding);
 
-  RunResult result;
-  result.training = std::move(guiding.training);
   const std::unique_ptr<Integrator> integrator = makeIntegrator(job, renderScene, guiding);
-  const double trained = result.training.report.seconds;
   Film film(camera.width(), camera.height());
-  {
-    Progress progress("rendering", job.samples ? *job.samples : *job.seconds - trained);
-    double done = 0;
-    result.render = render(camera, *integrator, film, renderOptions(job, trained), [&](const RenderProgress& p) {
-      const double now = job.samples ? p.samples : p.seconds;
-      progress.advance(now - done);
-      done = now;
-      log.add(film, trained + p.seconds, p.samples);
-    });
-  }
-  result.dropped = film.dropped();
+  const RenderResult rendered =
+      renderWithProgress(job, camera, *integrator, guiding.training.report.seconds, film, log);
+  const RunResult result{rendered, guiding, film.dropped()};
   if (result.dropped > 0) printWarning(kTool, fmt::format("{} samples were not finite and left out", result.dropped));
-  if (guiding.caches) {
-    result.lobeBytes = guiding.caches->bytes();
-    result.cacheHashes = guiding.caches->hashes();
-  }
   for (const auto& output : job.outputs) writeImage(output, film.mean(), attributes(job, result));
   log.write();
   if (!job.stats.empty()) writeAtomically(job.stats, statistics(job, result).dump(2) + "\n");
