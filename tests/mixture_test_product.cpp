@@ -85,7 +85,7 @@ TEST_CASE("mixture: mutants of the product fail the chi² test") {
   // No Z.
   CHECK(chi2PValue(window, sampler(product), [&](const Vec2& y) { return factorsAt(one, 0, two, y); }) < 1e-6);
   // Means weighted by the wrong covariance, which is what swapping the two means does.
-  const Gaussian narrow = makeGaussian(1, {0.2f, 0}, 0.1f, 0.1f, 0), wide = makeGaussian(1, {0.6f, 0}, 0.3f, 0.2f, 0);
+  const Gaussian narrow = makeGaussian(1, {0.2f, 0}, 0.1f, 0.1f, 0), wide = makeGaussian(1, {0.35f, 0}, 0.3f, 0.2f, 0);
   const Mixture a{narrow}, b{wide};
   const Product single(a, 0, b);
   CHECK(productPValue(single, window) > 0.01);

@@ -5,10 +5,12 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include "runtime/mixture/gaussian.h"
 #include "runtime/mixture/random.h"
+#include "tests/chi2.h"
 
 namespace lobe {
 
@@ -55,51 +57,23 @@ double integrate(const Window& w, int n, const F& f) {
   return sum * 4.0 * w.half * w.half / (static_cast<double>(n) * n);
 }
 
-/// P(χ² with this many degrees of freedom > value), by Wilson and Hilferty's cube root.
-inline double chi2Tail(double value, int freedom) {
-  const double v = 2.0 / (9.0 * freedom);
-  return 0.5 * std::erfc((std::cbrt(value / freedom) - (1 - v)) / std::sqrt(2 * v));
-}
-
-/// The p value of `samples` draws against a density that integrates to one over the plane: cells × cells bins of the
-/// window, everything outside being one bin more; bins of few expected samples are pooled. 0 if a draw is not finite or
-/// the density exceeds 1 in mass.
+/// The p value of a sampler of the plane against a density that integrates to one over it; samples outside the window
+/// only have to be as many as the density says. 0 if a draw is not finite.
 inline double chi2PValue(const Window& w, const std::function<Vec2(Rng&)>& sample,
-                         const std::function<double(const Vec2&)>& pdf, int samples = 200000, int cells = 24) {
-  std::vector<double> seen(static_cast<std::size_t>(cells * cells + 1));
-  Rng rng(11, static_cast<std::uint64_t>(samples));
-  for (int i = 0; i < samples; ++i) {
+                         const std::function<double(const Vec2&)>& pdf) {
+  Rng rng(11);
+  bool finite = true;
+  const auto draw = [&]() -> std::optional<Eigen::Vector2d> {
     const Vec2 y = sample(rng);
-    if (!y.allFinite()) return 0;
-    const Vec2 t = ((y - w.centre) / w.half + Vec2(1, 1)) * (0.5f * static_cast<float>(cells));
-    const bool inside =
-        t.x() >= 0 && t.y() >= 0 && t.x() < static_cast<float>(cells) && t.y() < static_cast<float>(cells);
-    ++seen[inside ? static_cast<std::size_t>(static_cast<int>(t.x()) * cells + static_cast<int>(t.y()))
-                  : seen.size() - 1];
-  }
-  double value = 0, pooledSeen = 0, pooledExpected = 0, inside = 0;
-  int freedom = -1;
-  const auto bin = [&](double observed, double expected) {
-    pooledSeen += observed, pooledExpected += expected;
-    if (pooledExpected < 10) return;
-    value += (pooledSeen - pooledExpected) * (pooledSeen - pooledExpected) / pooledExpected;
-    pooledSeen = pooledExpected = 0;
-    ++freedom;
+    finite = finite && y.allFinite();
+    return ((y - w.centre) / (2 * w.half) + Vec2(0.5f, 0.5f)).cast<double>();
   };
-  const float half = w.half / static_cast<float>(cells);
-  for (int i = 0; i < cells; ++i) {
-    for (int j = 0; j < cells; ++j) {
-      const Vec2 corner(static_cast<float>(2 * i + 1 - cells), static_cast<float>(2 * j + 1 - cells));
-      const double mass = integrate({w.centre + half * corner, half}, 12, pdf);
-      inside += mass;
-      bin(seen[static_cast<std::size_t>(i * cells + j)], samples * mass);
-    }
-  }
-  if (!(inside < 1.001)) return 0;
-  bin(seen.back(), samples * std::max(0.0, 1 - inside));
-  // What is left in the pool is too little for a bin of its own; gross excess there is a failure all the same.
-  if (pooledSeen > pooledExpected + 5 * std::sqrt(pooledExpected) + 10) return 0;
-  return freedom < 1 ? 0 : chi2Tail(value, freedom);
+  const double area = 4.0 * w.half * w.half;
+  const auto density = [&](const Eigen::Vector2d& t) {
+    return area * pdf(w.centre + 2 * w.half * (t.cast<float>() - Vec2(0.5f, 0.5f)));
+  };
+  const double p = chi2Square(draw, density, {.samples = 100000, .bins = 256}).pValue;
+  return finite ? p : 0;
 }
 
 /// A p value below this fails: 1 % over `tests` tests (Šidák).
