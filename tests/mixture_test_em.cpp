@@ -177,7 +177,7 @@ TEST_CASE("mixture: on-line training comes closer to the light with every pass")
         em.update(target.draw(rng, 250));
         if (pass == 5) after[1] += likelihood(unseen, em) / kRepeats;
       }
-      CHECK(em.samplesSeen() == 250 * 30);
+      CHECK(em.samplesSeen() == 7500);
       after[2] += likelihood(unseen, em) / kRepeats;
       learnt += em.background() / kRepeats;
     }

@@ -53,10 +53,10 @@ TEST_CASE("mixture: the product's density integrates to one, that of the printed
 }
 
 TEST_CASE("mixture: pairs are numbered without collision, as printed they collide") {
-  constexpr int kOne = 3, kTwo = 5;
-  std::set<int> ours, printed;
-  for (int k1 = 0; k1 < kOne; ++k1) {
-    for (int k2 = 0; k2 < kTwo; ++k2) {
+  constexpr std::size_t kOne = 3, kTwo = 5;
+  std::set<std::size_t> ours, printed;
+  for (std::size_t k1 = 0; k1 < kOne; ++k1) {
+    for (std::size_t k2 = 0; k2 < kTwo; ++k2) {
       ours.insert(kTwo * k1 + k2);
       printed.insert(kOne * k1 + k2);
     }
