@@ -27,6 +27,7 @@ double gap(const DirectionGrid& grid, const Vec3& w, const Vec3& entry) {
 // How much farther the grid's answer is than the nearest entry, at worst.
 double worstExcess(const DirectionGrid& grid, int queries) {
   std::vector<Vec3> entries;
+  entries.reserve(static_cast<std::size_t>(grid.count));
   for (int i = 0; i < grid.count; ++i) entries.push_back(grid.direction(i));
   Rng rng(31);
   double worst = 0;
