@@ -297,12 +297,14 @@ TEST_CASE("fitter: look-up turns and moves mixtures to the query, and its sign i
     const std::span<Gaussian> aligned = alignMixture(grid, entry, own, wo, buffer);
     REQUIRE(aligned.size() == own.size());
     moved += gradeMixture(*lobe, wo, aligned, 2048).coverage;
-    const Vec2 step =
-        toDisc(direction(elevation, 117)) - toDisc(grid.direction(entry)).norm() * wo.head<2>().normalized();
-    for (Gaussian& g : aligned) g.meanX += step.x(), g.meanY += step.y();
-    unmoved += gradeMixture(*lobe, wo, aligned, 2048).coverage;
-    for (Gaussian& g : aligned) g.meanX += step.x(), g.meanY += step.y();
-    wrong += gradeMixture(*lobe, wo, aligned, 2048).coverage;
+    Mixture turned;
+    for (const Gaussian& g : own) turned.push_back(rotated(g, wo.head<2>().normalized()));
+    unmoved += gradeMixture(*lobe, wo, turned, 2048).coverage;
+    for (std::size_t k = 0; k < turned.size(); ++k) {
+      turned[k].meanX -= aligned[k].meanX - turned[k].meanX;
+      turned[k].meanY -= aligned[k].meanY - turned[k].meanY;
+    }
+    wrong += gradeMixture(*lobe, wo, turned, 2048).coverage;
   }
   CHECK(moved < 0.7 * unmoved);
   CHECK(unmoved < 0.7 * wrong);
