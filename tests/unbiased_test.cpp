@@ -1,0 +1,257 @@
+// All integrators estimate the same picture: against each other pixel block by pixel block, and against what is known
+// in closed form. A sampler with a wrong density must be found out.
+
+#include <catch2/catch.hpp>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+
+#include <oneapi/tbb/global_control.h>
+
+#include <unistd.h>
+
+#include "fitter/compile.h"
+#include "runtime/render/path_integrator.h"
+#include "runtime/render/renderer.h"
+#include "runtime/render/training.h"
+#include "scenes/camera.h"
+#include "scenes/reader.h"
+
+using namespace lobe;
+
+namespace {
+
+/// A folder of this test's own, removed at its end.
+struct TemporaryFolder {
+  std::filesystem::path path;
+  TemporaryFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "lobe-unbiased-XXXXXX").string();
+    path = mkdtemp(name.data());
+  }
+  ~TemporaryFolder() { std::filesystem::remove_all(path); }
+};
+
+/// Everything that rendering a scene by every integrator takes, with coarse caches and little training: estimates have
+/// to be right however rough the mixtures are.
+class Studio {
+ public:
+  explicit Studio(Scene s, int width, int height) : scene_(std::move(s)) {
+    scene_.camera.width = width;
+    scene_.camera.height = height;
+    scene_.camera.horizontalFov = horizontalFov(scene_.camera, width, height);
+    renderScene_.emplace(scene_);
+    camera_.emplace(scene_.camera, scene_.filter);
+    CompileOptions options;
+    options.directory = folder_.path / "lobes";
+    options.settings.samples = 512;
+    options.settings.components = 4;
+    options.elevations = 12;
+    options.directions = 48;
+    for (const CompileJob& job : planCompile(collectLobes(scene_), options)) runCompile(job, [] {});
+    caches_.emplace(options.directory, lobeRequests(scene_), "lobefit");
+    TrainingPlan plan;
+    plan.passes = 3;
+    plan.photons = 20000;
+    plan.importons = 8000;
+    plan.seed = 5;
+    illumination_ = trainIllumination(*renderScene_, *camera_, &*caches_, plan).cache;
+    guided_.emplace(scene_, illumination_, nullptr);
+    product_.emplace(scene_, illumination_, &*caches_);
+  }
+
+  Film render(const Integrator& integrator, int samples, std::uint64_t seed) const {
+    Film film(camera_->width(), camera_->height());
+    lobe::render(*camera_, integrator, film, {seed, samples, std::nullopt});
+    return film;
+  }
+
+  PathIntegrator path() const { return {*renderScene_, {}}; }
+  GuidedIntegrator guided() const { return {*renderScene_, {}, *guided_}; }
+  GuidedIntegrator product() const { return {*renderScene_, {}, *product_}; }
+  const RenderScene& renderScene() const { return *renderScene_; }
+  const Scene& scene() const { return scene_; }
+  const GuidedSampler& productSampler() const { return *product_; }
+  const IlluminationCache& illumination() const { return illumination_; }
+
+ private:
+  TemporaryFolder folder_;
+  Scene scene_;
+  std::optional<RenderScene> renderScene_;
+  std::optional<PinholeCamera> camera_;
+  std::optional<BrdfCaches> caches_;
+  IlluminationCache illumination_;
+  std::optional<GuidedSampler> guided_, product_;
+};
+
+/// A product sampler that says a density a tenth too high.
+struct WrongSampler {
+  const GuidedSampler& right;
+  class Vertex {
+   public:
+    Vertex(const WrongSampler& sampler, const SurfaceHit& hit) : vertex_(sampler.right, hit) {}
+    std::optional<BsdfSample> sample(Rng& rng, PathStatistics& statistics) const {
+      auto sample = vertex_.sample(rng, statistics);
+      if (sample && vertex_.guided()) sample->pdf *= 1.1f;
+      return sample;
+    }
+    float pdf(const Vec3& wi) const { return vertex_.pdf(wi) * (vertex_.guided() ? 1.1f : 1.0f); }
+
+   private:
+    GuidedSampler::Vertex vertex_;
+  };
+};
+
+class WrongIntegrator : public Integrator {
+ public:
+  explicit WrongIntegrator(const Studio& studio) : scene_(studio.renderScene()), sampler_{studio.productSampler()} {}
+  Rgb radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const override {
+    return PathLoop(scene_, options_, sampler_).radiance(ray, rng, statistics);
+  }
+
+ private:
+  const RenderScene& scene_;
+  PathOptions options_;
+  WrongSampler sampler_;
+};
+
+struct Block {
+  double mean = 0, variance = 0;
+};
+
+/// Luminance of blocks of pixels with the variance of that estimate.
+std::vector<Block> blocks(const Film& film, int size) {
+  const Image mean = film.mean(), variance = film.varianceOfMean();
+  std::vector<Block> all;
+  for (int y0 = 0; y0 + size <= film.height(); y0 += size)
+    for (int x0 = 0; x0 + size <= film.width(); x0 += size) {
+      Block block;
+      for (int y = y0; y < y0 + size; ++y)
+        for (int x = x0; x < x0 + size; ++x) {
+          block.mean += mean.at(x, y).mean() / (size * size);
+          // Channels go up and down together: the standard deviation of their mean is at most the mean of theirs.
+          const double deviation = variance.at(x, y).sqrt().mean();
+          block.variance += deviation * deviation / std::pow(size, 4);
+        }
+      all.push_back(block);
+    }
+  return all;
+}
+
+/// Whether two pictures may be estimates of the same: no block further apart than chance allows among so many (Šidák,
+/// at 0.1 %), and not all of them together.
+bool agree(const std::vector<Block>& a, const std::vector<Block>& b) {
+  double worst = 0, sumA = 0, sumB = 0, variance = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double v = a[i].variance + b[i].variance;
+    if (v > 0) worst = std::max(worst, std::abs(a[i].mean - b[i].mean) / std::sqrt(v));
+    sumA += a[i].mean;
+    sumB += b[i].mean;
+    variance += v;
+  }
+  const double together = std::abs(sumA - sumB) / std::sqrt(variance);
+  const double chance = std::erfc(worst / std::sqrt(2.0));  // of one block, both sides
+  const double level = 1 - std::pow(1 - 0.001, 1.0 / static_cast<double>(a.size()));
+  UNSCOPED_INFO("worst " << worst << ", together " << together << ", ratio " << sumA / sumB);
+  return chance > level && together < 3.3;
+}
+
+std::vector<Block> exactly(double value, std::size_t count) {
+  return std::vector<Block>(count, Block{value, 0});
+}
+
+}  // namespace
+
+TEST_CASE("unbiased: path, guided and product agree on the demo scene", "[slow]") {
+  const Studio studio(readScene(std::string(LOBE_SOURCE_DIR) + "/scenes/jewelry.xml"), 60, 40);
+  REQUIRE(studio.illumination().records().size() > 100);
+  const int samples = 192, size = 5;
+  const auto path = blocks(studio.render(studio.path(), 2 * samples, 1), size);
+  CHECK(agree(path, blocks(studio.render(studio.guided(), samples, 2), size)));
+  CHECK(agree(path, blocks(studio.render(studio.product(), samples, 3), size)));
+  CHECK_FALSE(agree(path, blocks(studio.render(WrongIntegrator(studio), samples, 4), size)));
+}
+
+TEST_CASE("unbiased: inside a glowing box radiance is emission over absorption", "[slow]") {
+  const TemporaryFolder folder;
+  std::ofstream(folder.path / "furnace.xml") << R"(<scene version="3.0.0">
+    <sensor type="perspective"><float name="fov" value="70"/></sensor>
+    <shape type="cube"><boolean name="flip_normals" value="true"/>
+      <bsdf type="diffuse"><rgb name="reflectance" value="0.6, 0.6, 0.6"/></bsdf>
+      <emitter type="area"><rgb name="radiance" value="0.8, 0.8, 0.8"/></emitter></shape></scene>)";
+  const Studio studio(readScene(folder.path / "furnace.xml"), 30, 20);
+  for (const auto& film : {studio.render(studio.path(), 256, 6), studio.render(studio.guided(), 256, 7),
+                           studio.render(studio.product(), 256, 8)}) {
+    const auto found = blocks(film, 5);
+    CHECK(agree(found, exactly(2.0, found.size())));
+  }
+  CHECK(studio.illumination().records().size() > 10);
+  const auto wrong = blocks(studio.render(WrongIntegrator(studio), 256, 6), 5);
+  CHECK_FALSE(agree(wrong, exactly(2.0, wrong.size())));
+}
+
+namespace {
+
+/// An environment with a broad bright spot over a dim ground colour.
+Image spotImage() {
+  Image image(64, 32);
+  for (int y = 0; y < 32; ++y)
+    for (int x = 0; x < 64; ++x) {
+      const double dx = (x - 40) / 6.0, dy = (y - 8) / 4.0;
+      image.at(x, y) = grey(static_cast<float>(0.2 + 5 * std::exp(-dx * dx - dy * dy)));
+    }
+  return image;
+}
+
+/// ∫ ρ(wo, wi) L(wi) cosθ dω by a fine midpoint rule.
+double reflected(const Studio& studio, const Vec3& wo) {
+  const Bsdf& bsdf = *studio.scene().materials[0].bsdf;
+  const int steps = 1000;
+  double sum = 0;
+  for (int i = 0; i < steps; ++i)
+    for (int j = 0; j < 2 * steps; ++j) {
+      const double z = (i + 0.5) / steps, phi = M_PI * (j + 0.5) / steps, r = std::sqrt(1 - z * z);
+      const Vec3 wi(static_cast<float>(r * std::cos(phi)), static_cast<float>(r * std::sin(phi)),
+                    static_cast<float>(z));
+      sum += z * luminance(bsdf.eval(wo, wi, Vec2::Zero()) * studio.renderScene().lights.environmentRadiance(wi));
+    }
+  return sum * M_PI / (static_cast<double>(steps) * steps);
+}
+
+}  // namespace
+
+TEST_CASE("unbiased: a glossy plate under a bright spot reflects what the integral says", "[slow]") {
+  const TemporaryFolder folder;
+  // Seen from 50° through a narrow lens: wo hardly varies over the picture.
+  std::ofstream(folder.path / "plate.xml") << R"(<scene version="3.0.0">
+    <sensor type="perspective"><float name="fov" value="0.5"/>
+      <transform name="to_world"><lookat origin="-7.66044, 0, 6.42788" target="0, 0, 0" up="0, 0, 1"/></transform></sensor>
+    <shape type="rectangle">
+      <bsdf type="roughconductor"><string name="distribution" value="ggx"/><float name="alpha" value="0.25"/>
+        <rgb name="eta" value="0.2, 0.2, 0.2"/><rgb name="k" value="3.9, 3.9, 3.9"/></bsdf></shape></scene>)";
+  Scene scene = readScene(folder.path / "plate.xml");
+  scene.environment = Environment{spotImage()};
+  const Studio studio(std::move(scene), 20, 20);
+  REQUIRE(!studio.illumination().records().empty());
+  const double expected = reflected(studio, Vec3(-0.766044f, 0, 0.642788f));
+  REQUIRE(expected > 0.2);
+  for (const auto& film : {studio.render(studio.path(), 1024, 7), studio.render(studio.guided(), 1024, 8),
+                           studio.render(studio.product(), 1024, 9)}) {
+    const auto found = blocks(film, 5);
+    CHECK(agree(found, exactly(expected, found.size())));
+  }
+  const auto wrong = blocks(studio.render(WrongIntegrator(studio), 1024, 9), 5);
+  CHECK_FALSE(agree(wrong, exactly(expected, wrong.size())));
+}
+
+TEST_CASE("unbiased: training and rendering give the same bytes on any number of threads", "[slow]") {
+  const auto renderWith = [](std::size_t threads) {
+    const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism, threads);
+    const Studio studio(readScene(std::string(LOBE_SOURCE_DIR) + "/scenes/jewelry.xml"), 24, 16);
+    return studio.render(studio.product(), 8, 1).mean();
+  };
+  const Image one = renderWith(1), two = renderWith(2);
+  for (std::size_t i = 0; i < one.pixels.size(); ++i) REQUIRE((one.pixels[i] == two.pixels[i]).all());
+}
