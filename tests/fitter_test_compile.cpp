@@ -1,0 +1,262 @@
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include <tbb/global_control.h>
+#include <nlohmann/json.hpp>
+
+#include "fitter/compile.h"
+#include "fitter/report.h"
+#include "scenes/tool.h"
+#include "schema/atomic_file.h"
+#include "tests/fitter_test_lobes.h"
+
+using namespace lobe;
+namespace fs = std::filesystem;
+
+namespace {
+
+struct TemporaryFolder {
+  fs::path path;
+  TemporaryFolder() {
+    std::string name = (fs::temp_directory_path() / "lobe-fitter-XXXXXX").string();
+    REQUIRE(mkdtemp(name.data()) != nullptr);
+    path = name;
+  }
+  ~TemporaryFolder() { fs::remove_all(path); }
+};
+
+std::string readFile(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+Scene sceneOf(const std::vector<std::pair<std::string, BsdfPtr>>& materials) {
+  Scene scene;
+  for (const auto& [name, bsdf] : materials) scene.materials.push_back({name, bsdf});
+  return scene;
+}
+
+CompileOptions quickOptions(const fs::path& folder) {
+  CompileOptions options;
+  options.directory = folder / "caches";
+  options.elevations = 6;
+  options.directions = 12;
+  options.settings.samples = 512;
+  return options;
+}
+
+void runAll(const std::vector<CompileJob>& jobs) {
+  for (const CompileJob& job : jobs)
+    if (!job.upToDate) runCompile(job, [] {});
+}
+
+}  // namespace
+
+TEST_CASE("fitter: equal lobes are fitted once, whatever the material") {
+  const Scene scene = sceneOf({{"red", roughConductor(0.2, 0.2)},
+                               {"rough", roughConductor(0.3, 0.3)},
+                               {"blue", roughConductor(0.2, 0.2)},
+                               {"plain", makeBsdf("diffuse", {})}});
+  const std::vector<LobeUse> uses = collectLobes(scene);
+  REQUIRE(uses.size() == 2);
+  CHECK(uses[0].materials == std::vector<std::string>{"red", "blue"});
+  CHECK(uses[1].materials == std::vector<std::string>{"rough"});
+  CHECK(abbreviated(uses[0].materials) == "red + 1 more");
+}
+
+TEST_CASE("fitter: what is up to date is left alone, what is not says why") {
+  const TemporaryFolder folder;
+  const std::vector<LobeUse> uses =
+      collectLobes(sceneOf({{"iso", roughConductor(0.3, 0.3)}, {"aniso", roughConductor(0.1, 0.3)}}));
+  CompileOptions options = quickOptions(folder.path);
+  std::vector<CompileJob> jobs = planCompile(uses, options);
+  REQUIRE(jobs.size() == 2);
+  CHECK((jobs[0].grid.kind == GridKind::elevation && jobs[1].grid.kind == GridKind::fibonacci));
+  CHECK((!jobs[0].upToDate && jobs[0].stale.empty()));
+  runAll(jobs);
+  for (const CompileJob& job : planCompile(uses, options)) CHECK(job.upToDate);
+
+  options.force = true;
+  CHECK(!planCompile(uses, options)[0].upToDate);
+  options.force = false;
+  options.settings.components = 4;
+  CHECK(planCompile(uses, options)[0].stale == "other fit settings");
+  options = quickOptions(folder.path);
+  options.elevations = 7;
+  jobs = planCompile(uses, options);
+  CHECK(jobs[0].stale == "another grid of directions");
+  CHECK(jobs[1].upToDate);
+  fs::resize_file(jobs[1].path, 100);
+  CHECK_THAT(planCompile(uses, options)[1].stale, Catch::Contains("truncated"));
+}
+
+TEST_CASE("fitter: the same bytes from any number of threads") {
+  const TemporaryFolder folder;
+  const std::vector<LobeUse> uses =
+      collectLobes(sceneOf({{"iso", roughConductor(0.3, 0.3)}, {"aniso", roughConductor(0.1, 0.3)}}));
+  std::array<std::vector<std::string>, 2> contents;
+  for (const std::size_t threads : {1u, 2u}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    CompileOptions options = quickOptions(folder.path);
+    options.directory = folder.path / std::to_string(threads);
+    const std::vector<CompileJob> jobs = planCompile(uses, options);
+    runAll(jobs);
+    for (const CompileJob& job : jobs) contents[threads - 1].push_back(readFile(job.path));
+  }
+  CHECK(contents[0] == contents[1]);
+  CHECK(contents[0][0].size() > 500);
+}
+
+TEST_CASE("fitter: the summary of a cache is that of its records") {
+  const TemporaryFolder folder;
+  LobeCacheInfo info;
+  info.model = info.key = info.summary = info.toolVersion = "x";
+  info.gridCount = 3;
+  const CacheComponent c{1, 0, 0, 0.1f, 0, 0.1f};
+  const CacheComponent half{0.5f, 0, 0, 0.1f, 0, 0.1f};
+  const std::vector<CacheRecord> records{
+      {0, 1, 1, 1, 0.5f, 0.1f, 0.3f, 0.4f}, {1, 2, 1, 1, 0.5f, 0.3f, 0.1f, 0.6f}, {0, 1, 1, 1, 0.5f, 0.2f, 0.2f, 0.5f}};
+  writeAtomically(folder.path / "x.lobe", encodeLobeCache(info, records, std::vector{c, half, half}));
+  const CacheSummary s = summarise(LobeCache::open(folder.path / "x.lobe"));
+  CHECK(s.records == 3);
+  CHECK(s.meanComponents == Approx(4.0 / 3));
+  CHECK(s.nevMedian == Approx(0.2));
+  CHECK(s.nevWorst == Approx(0.3));
+  CHECK(s.coverageMedian == Approx(0.5));
+  CHECK(s.coverageWorst == Approx(0.6));
+  CHECK(s.outside == Approx(0.2));
+}
+
+TEST_CASE("fitter: options out of range are named") {
+  const auto fault = [](const std::function<void(CompileOptions&)>& change) {
+    CompileOptions options;
+    change(options);
+    try {
+      options.validate();
+    } catch (const std::runtime_error& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  CHECK(fault([](CompileOptions&) {}).empty());
+  CHECK_THAT(fault([](CompileOptions& o) { o.settings.components = 0; }), Catch::Contains("--components"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.settings.components = 33; }), Catch::Contains("--components"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.settings.samples = 3; }), Catch::Contains("--samples"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.settings.reduction = -1; }), Catch::Contains("--reduction"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.settings.reduction = std::nanf(""); }), Catch::Contains("--reduction"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.elevations = 0; }), Catch::Contains("--elevations"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.directions = -5; }), Catch::Contains("--directions"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.directory = ""; }), Catch::Contains("--output"));
+}
+
+namespace {
+
+struct ToolResult {
+  int code;
+  std::string out, error;
+};
+
+/// Runs one of our binaries with its output caught in the folder.
+ToolResult runBinary(const fs::path& folder, const std::string& arguments) {
+  const fs::path out = folder / "out", error = folder / "error";
+  const std::string command = "cd " + folder.string() + " && " + LOBE_BIN_DIR "/" + arguments + " >out 2>error";
+  const int status = std::system(command.c_str());
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, readFile(out), readFile(error)};
+}
+
+long lineCount(const std::string& text) {
+  return std::ranges::count(text, '\n');
+}
+
+const char* const kTwoMaterials = R"(<scene version="0.6.0">
+  <bsdf type="roughconductor" id="Steel"><string name="distribution" value="ggx"/>
+    <float name="alpha" value="$roughness"/></bsdf>
+  <bsdf type="roughconductor" id="Again"><string name="distribution" value="ggx"/>
+    <float name="alpha" value="0.3"/></bsdf>
+  <shape type="sphere"><ref id="Steel"/></shape>
+  <shape type="sphere"><ref id="Again"/></shape>
+  <shape type="sphere"><bsdf type="diffuse"/></shape>
+</scene>)";
+
+}  // namespace
+
+TEST_CASE("fitter: lobefit compiles a scene, then has nothing to do; lobedump shows what it made") {
+  const TemporaryFolder folder;
+  writeAtomically(folder.path / "scene.xml", std::string(kTwoMaterials));
+  const std::string fit = "lobefit scene.xml -D roughness=0.3 --elevations 4 --samples 256";
+  ToolResult r = runBinary(folder.path, fit + " --json");
+  CHECK(r.code == 0);
+  CHECK_THAT(r.error, Catch::Contains("1 of 1 lobes written to lobes"));
+  const auto json = nlohmann::json::parse(r.out);
+  REQUIRE(json.size() == 1);
+  CHECK(json[0]["materials"] == nlohmann::json({"Steel", "Again"}));
+  CHECK(json[0]["records"] == 4);
+  r = runBinary(folder.path, fit);
+  CHECK(r.code == 0);
+  CHECK_THAT(r.error, Catch::Contains("nothing to do"));
+  CHECK_THAT(r.out, Catch::Contains("Steel + 1 more") && Catch::Contains("up to date"));
+
+  r = runBinary(folder.path, "lobedump lobes/*.lobe --records");
+  CHECK(r.code == 0);
+  CHECK(lineCount(r.out) == 6 + 5 + 1 + 2);  // header, records, gap, table
+  r = runBinary(folder.path, "lobedump --json lobes/*.lobe");
+  CHECK(nlohmann::json::parse(r.out)[0]["records"].size() == 4);
+}
+
+TEST_CASE("fitter: tools refuse bad input with one line") {
+  const TemporaryFolder folder;
+  writeAtomically(folder.path / "scene.xml", std::string(kTwoMaterials));
+  writeAtomically(folder.path / "broken.xml", std::string("<scene><bsdf type='diffuse'></scene>"));
+  writeAtomically(folder.path / "no.lobe", std::string("something else"));
+  writeAtomically(folder.path / "empty.lobe", std::string());
+  const std::pair<const char*, int> cases[] = {{"lobefit", 2},
+                                               {"lobefit scene.xml --components 0 -D roughness=1", 2},
+                                               {"lobefit scene.xml --samples many", 2},
+                                               {"lobefit scene.xml --threads 0", 2},
+                                               {"lobefit scene.xml -D roughness", 2},
+                                               {"lobefit scene.xml --plot", 2},
+                                               {"lobefit scene.xml", 1},  // $roughness is not defined
+                                               {"lobefit missing.xml", 1},
+                                               {"lobefit broken.xml", 1},
+                                               {"lobefit scene.xml -D roughness=0.3 -o scene.xml/x", 1},
+                                               {"lobedump", 2},
+                                               {"lobedump missing.lobe", 1},
+                                               {"lobedump no.lobe", 1},
+                                               {"lobedump empty.lobe", 1},
+                                               {"lobedump .", 1}};
+  for (const auto& [arguments, code] : cases) {
+    const ToolResult r = runBinary(folder.path, arguments);
+    CAPTURE(arguments, r.error);
+    CHECK(r.code == code);
+    CHECK(lineCount(r.error) == 1);
+    CHECK_THAT(r.error, Catch::Contains(": error: "));
+    CHECK(r.out.empty());
+  }
+  CHECK(!fs::exists(folder.path / "lobes"));
+}
+
+TEST_CASE("fitter: tools end with the exit code that fits and say why in one line") {
+  const auto run = [](std::vector<std::string> arguments, const std::function<void()>& work) {
+    std::vector<char*> argv;
+    for (std::string& a : arguments) argv.push_back(a.data());
+    int number = 0;
+    return runTool(
+        "tool", "A tool.", static_cast<int>(argv.size()), argv.data(),
+        [&](CLI::App& app) { app.add_option("--number", number, "A number"); }, work);
+  };
+  const auto nothing = [] {};
+  CHECK(run({"tool"}, nothing) == 0);
+  CHECK(run({"tool", "--number", "3"}, nothing) == 0);
+  CHECK(run({"tool", "--number", "x"}, nothing) == 2);
+  CHECK(run({"tool", "--unknown"}, nothing) == 2);
+  CHECK(run({"tool"}, [] { throw UsageError("no"); }) == 2);
+  CHECK(run({"tool"}, [] { throw std::runtime_error("failed"); }) == 1);
+}
