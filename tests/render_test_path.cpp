@@ -97,6 +97,21 @@ TEST_CASE("render: a furnace shines as emission over one minus albedo") {
   CHECK(deviation(estimate(PathIntegrator(ready, {}), ray, 20000), emission / (1 - kAlbedo)) < kMaxDeviation);
 }
 
+TEST_CASE("render: what is above for one normal and below for the other is dark") {
+  Scene scene;
+  TriangleMesh floor = rectangle({-50, 0, -50}, {0, 0, 100}, {100, 0, 0});
+  floor.normals.assign(4, Vec3(0.8f, 0.6f, 0));
+  addShape(scene, floor, addMaterial(scene, std::make_shared<Diffuse>(kAlbedo)));
+  addEmitter(scene, Sphere{{0, -3, 0}, 1}, 1);  // under the floor
+  const RenderScene ready(scene);
+  const auto seenFrom = [&](const Vec3& eye) {
+    return estimate(PathIntegrator(ready, {2}), {eye, (-eye).normalized()}, 1000).mean();
+  };
+  CHECK(seenFrom({-5, 1, 0}) == 0);  // above the floor, below the shading normal's horizon
+  CHECK(seenFrom({5, 1, 0}) == 0);   // above both
+  CHECK(seenFrom({-5, -5, 0}) > 0);  // below both
+}
+
 TEST_CASE("render: depth counts segments") {
   Scene scene;
   addEmitter(scene, Sphere{{0, 0, 0}, 2.0f, true}, 1, addMaterial(scene, std::make_shared<Diffuse>(kAlbedo)));
