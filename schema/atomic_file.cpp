@@ -23,7 +23,7 @@ namespace {
 /// does not replace the device.
 fs::path targetOf(const fs::path& path) {
   std::error_code error;
-  const fs::path target = fs::is_symlink(path, error) ? fs::weakly_canonical(path, error) : path;
+  fs::path target = fs::is_symlink(path, error) ? fs::weakly_canonical(path, error) : path;
   const fs::file_status status = fs::status(target, error);
   if (fs::is_directory(status)) throw std::runtime_error(path.string() + ": cannot write: is a directory");
   if (fs::exists(status) && !fs::is_regular_file(status))
@@ -35,8 +35,8 @@ fs::path targetOf(const fs::path& path) {
 fs::path createBeside(const fs::path& target, const fs::path& path) {
   static std::atomic<unsigned> counter = 0;
   for (;;) {
-    const fs::path candidate = target.parent_path() / fmt::format(".{}.{}-{}{}", target.stem().string(), ::getpid(),
-                                                                  counter++, target.extension().string());
+    fs::path candidate = target.parent_path() / fmt::format(".{}.{}-{}{}", target.stem().string(), ::getpid(),
+                                                            counter++, target.extension().string());
     const int file = ::open(candidate.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (file >= 0) {
       ::close(file);
