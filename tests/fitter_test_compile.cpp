@@ -246,6 +246,7 @@ TEST_CASE("fitter: tools refuse bad input with one line") {
 TEST_CASE("fitter: tools end with the exit code that fits and say why in one line") {
   const auto run = [](std::vector<std::string> arguments, const std::function<void()>& work) {
     std::vector<char*> argv;
+    argv.reserve(arguments.size());
     for (std::string& a : arguments) argv.push_back(a.data());
     int number = 0;
     return runTool(
