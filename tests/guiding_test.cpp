@@ -110,7 +110,7 @@ TEST_CASE("guiding: the look-up works far from the origin") {
 
 TEST_CASE("guiding: training finds the light and the background") {
   const Vec3 towards = Vec3(0.6f, 0.0f, 0.8f);
-  IlluminationTrainer trainer({}, 20.0f);
+  IlluminationTrainer trainer({}, 10.0f);
   for (int pass = 0; pass < 6; ++pass)
     trainer.learn(planeParticles(20000, towards, 0.3f, 100 + pass), planeRequests(500));
   REQUIRE(!trainer.cache().records().empty());
@@ -126,7 +126,7 @@ TEST_CASE("guiding: training finds the light and the background") {
 }
 
 TEST_CASE("guiding: training places no record where no particle is, and none twice") {
-  IlluminationTrainer trainer({}, 20.0f);
+  IlluminationTrainer trainer({}, 10.0f);
   trainer.learn({}, planeRequests(10));
   CHECK(trainer.cache().records().empty());
   const auto particles = planeParticles(5000, Vec3::UnitZ(), 0.5f, 3);

@@ -16,7 +16,7 @@ namespace lobe {
 struct TrainingOptions {
   int components = 8;        ///< Gaussians a record, 1 to 8
   int neighbours = 250;      ///< particles a record is updated from, at most
-  float unitShare = 0.01f;   ///< the length u, as a share of the scene's bounding-box diagonal
+  float unitShare = 0.02f;   ///< the length u, as a share of the scene's bounding-box diagonal
   float klThreshold = 5.0f;  ///< κ, how far in standard deviations a component may move before a record is invalid
   StepwiseEmOptions em;
 

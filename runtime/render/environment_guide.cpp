@@ -27,8 +27,16 @@ int EnvironmentGuide::cellOf(const Vec2& u) {
 }
 
 void EnvironmentGuide::learn(const Vec3& point, const Vec3& wi, float weight) {
+  // Few importons leave: each speaks for the cells around its own, too, else the first photons of every cell that none
+  // has found yet would weigh more than all others together.
   const Vec2 u = lights_.photonCoordinates(point, wi);
-  weights_[static_cast<std::size_t>(blockOf(wi)) * kCells * kCells + cellOf(u)] += weight;
+  float* const cells = &weights_[static_cast<std::size_t>(blockOf(wi)) * kCells * kCells];
+  for (int dy = -1; dy <= 1; ++dy)
+    for (int dx = -1; dx <= 1; ++dx) {
+      const int x = std::clamp(static_cast<int>(u.x() * kCells) + dx, 0, kCells - 1);
+      const int y = (static_cast<int>(u.y() * kCells) + dy + kCells) % kCells;  // the azimuth
+      cells[y * kCells + x] += weight / static_cast<float>((1 + std::abs(dx)) * (1 + std::abs(dy)) * 4);
+    }
 }
 
 void EnvironmentGuide::update() {
@@ -36,30 +44,21 @@ void EnvironmentGuide::update() {
 }
 
 std::optional<EmittedPhoton> EnvironmentGuide::sample(float choice, const Vec2& u1, const Vec2& u2) const {
-  const bool learnt = bins_.total() > 0;
-  const float unguided = learnt ? kUnguidedShare : 1.0f;
-  Vec2 u = u2;
-  std::optional<EnvironmentSample> from;
-  if (choice < unguided) {
-    from = environment_.sample(u1);
-  } else {
-    choice = std::min((choice - unguided) / (1.0f - unguided), kOneMinusEpsilon);
-    const auto bin = static_cast<int>(bins_.sample(choice));
-    const PixelBlock pixels = block(bin / (kCells * kCells));
-    if (environment_.blockWeight(pixels) <= 0) return std::nullopt;
-    from = environment_.sample(pixels, u1);
-    // Interpolation carries directions over a block's border; there the neighbour's photons do the work.
-    if (from && blockOf(from->wi) != bin / (kCells * kCells)) return std::nullopt;
-    const int cell = bin % (kCells * kCells);
-    u = Vec2((cell % kCells + u2.x()) / kCells, (cell / kCells + u2.y()) / kCells).cwiseMin(kOneMinusEpsilon);
+  if (!(bins_.total() > 0)) {
+    const std::optional<EnvironmentSample> from = environment_.sample(u1);
+    if (!from) return std::nullopt;
+    return lights_.photonFromEnvironment(*from, u2);
   }
-  if (!from) return std::nullopt;
-  float pdf = unguided * environment_.pdf(from->wi);
-  if (learnt) {
-    const int index = blockOf(from->wi);
-    const float share = bins_.probability(static_cast<std::size_t>(index) * kCells * kCells + cellOf(u));
-    if (share > 0) pdf += (1.0f - unguided) * share * kCells * kCells * environment_.pdf(block(index), from->wi);
-  }
+  const std::size_t bin = bins_.sample(choice);
+  const int index = static_cast<int>(bin) / (kCells * kCells), cell = static_cast<int>(bin) % (kCells * kCells);
+  const PixelBlock pixels = block(index);
+  if (environment_.blockWeight(pixels) <= 0) return std::nullopt;
+  const std::optional<EnvironmentSample> from = environment_.sample(pixels, u1);
+  // Interpolation carries directions over a block's border; there the neighbour's photons do the work.
+  if (!from || blockOf(from->wi) != index) return std::nullopt;
+  const Vec2 corner(static_cast<float>(cell % kCells), static_cast<float>(cell / kCells));
+  const Vec2 u = ((corner + u2) / kCells).cwiseMin(kOneMinusEpsilon);
+  const float pdf = bins_.probability(bin) * kCells * kCells * from->pdf;
   if (!(pdf > 0)) return std::nullopt;
   return lights_.photonFromEnvironment({from->wi, from->radiance, pdf}, u);
 }

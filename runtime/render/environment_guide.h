@@ -3,8 +3,9 @@
 // with windows, say). Learnt from importons that leave the scene (training notes, "A pass", step 2).
 //
 // A histogram over blocks of directions × cells of the disc that the scene's bounding sphere shows to each; within a
-// block directions follow the environment's radiance. A share of photons ignores the histogram, so that all light is
-// found.
+// block directions follow the environment's radiance. Photons start only where importons have left: one from elsewhere
+// would weigh as much as hundreds of them, and spoil the records it meets. (Measured: a share of 0.1 for all directions
+// costs a fifth of the gain in the kitchen.)
 
 #include <optional>
 #include <vector>
@@ -29,7 +30,6 @@ class EnvironmentGuide {
  private:
   static constexpr int kBlockColumns = 64, kBlockRows = 32;
   static constexpr int kCells = 32;  // along each axis of the disc's square
-  static constexpr float kUnguidedShare = 0.1f;
 
   PixelBlock block(int index) const;
   int blockOf(const Vec3& wi) const;

@@ -29,7 +29,7 @@ struct RenderJob {
   std::optional<int> maxDepth;  ///< segments
   std::uint64_t seed = 1;
   TrainingPlan training;
-  double trainingShare = 0.25;  ///< of seconds, at most
+  double trainingShare = 0.3;  ///< of seconds, at most
 
   std::filesystem::path reference, convergence, stats;  ///< empty: not wanted
 

@@ -10,8 +10,8 @@ namespace lobe {
 
 struct TrainingPlan {
   int passes = 8;
-  int photons = 100000;        ///< a pass
-  int importons = 50000;       ///< a pass
+  int photons = 300000;        ///< a pass
+  int importons = 100000;      ///< a pass
   double seconds = kInfinity;  ///< no pass starts after that; the result then depends on the machine's speed
   std::uint64_t seed = 1;
   TrainingOptions records;
