@@ -77,6 +77,26 @@ bool leave(const SurfaceHit& hit, const Scattered& scattered, Flight& flight, Rn
   return true;
 }
 
+/// How light from infinitely far reaches a point.
+enum class Passage { blocked, free, refracted };
+
+/// Follows the direction through surfaces that only refract, as if they did not bend it: exact for panes, and near
+/// enough to learn where photons should start.
+Passage passageToEnvironment(const RayTracer& tracer, const SurfacePoint& from, const Vec3& direction) {
+  constexpr int maxSurfaces = 16;
+  Passage passage = Passage::free;
+  Ray ray = spawnRay(from, direction);
+  for (int i = 0; i < maxSurfaces; ++i) {
+    const std::optional<SurfaceHit> hit = tracer.trace(ray);
+    if (!hit) return passage;
+    if (!hit->bsdf || !hit->bsdf->transmits() || hit->bsdf->deltaProbability(hit->wo, hit->uv) <= 0)
+      return Passage::blocked;
+    passage = Passage::refracted;
+    ray = spawnRay(*hit, direction);
+  }
+  return Passage::blocked;
+}
+
 Vec3 normalTowards(const SurfaceHit& hit) {
   return std::copysign(1.0f, hit.normal.dot(hit.woWorld)) * hit.normal;
 }
@@ -154,16 +174,18 @@ void ParticleTracer::traceImporton(Rng& rng, ImportonResult& result) const {
 
 void ParticleTracer::addDirectUse(const SurfaceHit& hit, const GuidedSampler::Vertex& vertex, const Rgb& throughput,
                                   int depth, Rng& rng, ImportonResult& result) const {
-  // The first surface's direct light is the renderer's own emitter sampling's work.
   const float choice = rng.uniform();
   const std::optional<LightSample> light = scene_.lights.sample(hit.position, choice, rng.uniform2());
-  if (depth == 1 || !light || light->source) return;
+  if (!light || light->source) return;
   const Vec3 wi = hit.frame.toLocal(light->wi);
   if (!sidesAgree(hit, light->wi, wi)) return;
   const Rgb value = throughput * hit.bsdf->eval(hit.wo, wi, hit.uv) * light->radiance;
-  const float share = misWeight(light->pdf, vertex.pdf(wi));
-  const float weight = luminance(value) * std::abs(wi.z()) * share / light->pdf;
-  if (!(weight > 0) || !std::isfinite(weight) || !scene_.visible(hit, *light)) return;
+  float weight = luminance(value) * std::abs(wi.z()) / light->pdf;
+  if (!(weight > 0) || !std::isfinite(weight)) return;
+  const Passage passage = passageToEnvironment(scene_.tracer, hit, light->wi);
+  // What reaches the first surface freely is the renderer's own emitter sampling's work.
+  if (passage == Passage::blocked || (passage == Passage::free && depth == 1)) return;
+  if (passage == Passage::free) weight *= misWeight(light->pdf, vertex.pdf(wi));
   result.uses.push_back({hit.position, light->wi, weight});
 }
 

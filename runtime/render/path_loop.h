@@ -63,6 +63,7 @@ class PathLoop {
     Rgb radiance = Rgb::Zero();
     Rgb throughput = Rgb::Ones();
     float pdf = 0;   // of the last direction; 0 after the camera or a delta part: emitter sampling could not find it
+    Rgb expected = Rgb::Ones();  // product of the albedos met: what scattering leaves on average, whatever was sampled
     float eta2 = 1;  // how much refraction has compressed radiance so far, which termination has to undo
     Vec3 previous = Vec3::Zero();
     int depth = 0;
@@ -91,7 +92,9 @@ class PathLoop {
 
   bool survives(Path& path) const {
     if (path.depth < options_.rouletteDepth) return true;
-    const float survival = std::min(path.throughput.maxCoeff() * path.eta2, kMaxSurvival);
+    // A guided direction has a small throughput because much light is expected there: it must not die of that.
+    const float carried = std::max(path.throughput.maxCoeff() * path.eta2, path.expected.maxCoeff());
+    const float survival = std::min(carried, kMaxSurvival);
     if (path.rng.uniform() >= survival) return false;
     path.throughput /= survival;
     return true;
@@ -143,6 +146,7 @@ class PathLoop {
     const Vec3 direction = hit.frame.toWorld(wi).normalized();
     if (!sidesAgree(hit, direction, wi)) return false;
     path.throughput *= weight;
+    path.expected *= hit.bsdf->albedo(hit.wo, hit.uv);
     path.previous = hit.position;
     path.ray = spawnRay(hit, direction);
     return path.throughput.maxCoeff() > 0.0f;
