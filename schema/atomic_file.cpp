@@ -93,4 +93,8 @@ void writeAtomically(const fs::path& path, const std::string& text) {
   writeAtomically(path, std::as_bytes(std::span(text)));
 }
 
+void checkWritable(const fs::path& path) {
+  ::unlink(createBeside(targetOf(path), path).c_str());
+}
+
 }  // namespace lobe

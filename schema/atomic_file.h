@@ -16,4 +16,7 @@ void writeAtomically(const std::filesystem::path& path, const std::function<void
 void writeAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void writeAtomically(const std::filesystem::path& path, const std::string& text);
 
+/// Throws, as writeAtomically would, when path cannot be written; leaves nothing behind. For before hours of work.
+void checkWritable(const std::filesystem::path& path);
+
 }  // namespace lobe

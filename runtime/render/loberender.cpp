@@ -1,5 +1,8 @@
 // loberender: trains the illumination of a scene and renders it.
 
+#include <algorithm>
+#include <cstdint>
+
 #include <oneapi/tbb/global_control.h>
 
 #include "runtime/render/render_job.h"
@@ -17,9 +20,13 @@ std::pair<int, int> parseSize(const std::string& text) {
   return {width, height};
 }
 
+constexpr std::uint64_t kMaxSeed = std::uint64_t{1} << 53;  // a picture's metadata holds it exactly
+
+const std::vector<std::string> kIntegratorNames{"path", "guided", "product"};  // in the order of IntegratorKind
+
 struct Options {
   RenderJob job;
-  std::string size;
+  std::string size, integrator = "product";
   int threads = 0;
 };
 
@@ -39,16 +46,16 @@ void declare(CLI::App& app, Options& options) {
   app.add_option("scene", job.scene, "Mitsuba scene file (XML)")->required();
   app.add_option("-o,--output", job.outputs, "Picture, .exr or .png; may be given several times")->required();
   app.add_option("--cache", job.cacheFolder, "Folder of the caches that lobefit made")->capture_default_str();
-  const std::map<std::string, IntegratorKind> kinds{
-      {"path", IntegratorKind::path}, {"guided", IntegratorKind::guided}, {"product", IntegratorKind::product}};
-  app.add_option("--integrator", job.integrator, "path, guided or product")
-      ->transform(CLI::CheckedTransformer(kinds))
-      ->default_str("product");
+  app.add_option("--integrator", options.integrator, "path, guided or product")
+      ->check(CLI::IsMember(kIntegratorNames))
+      ->capture_default_str();
   app.add_option("--spp", job.samples, "Samples per pixel");
   app.add_option("--seconds", job.seconds, "Seconds of training and rendering, instead of --spp");
   app.add_option("--size", options.size, "WIDTHxHEIGHT in pixels, instead of the scene's");
   app.add_option("--max-depth", job.maxDepth, "Longest path in segments (default: no limit)");
-  app.add_option("--seed", job.seed, "Random seed")->capture_default_str();
+  app.add_option("--seed", job.seed, "Random seed")
+      ->check(CLI::Range(std::uint64_t{0}, kMaxSeed))
+      ->capture_default_str();
   app.add_option("--reference", job.reference, "Picture to measure the error against while rendering");
   app.add_option("--convergence", job.convergence, "CSV of that error over time");
   app.add_option("--stats", job.stats, "JSON file for the run's statistics");
@@ -59,6 +66,8 @@ void declare(CLI::App& app, Options& options) {
 }
 
 void work(Options& options) {
+  const auto name = std::ranges::find(kIntegratorNames, options.integrator);
+  options.job.integrator = static_cast<IntegratorKind>(name - kIntegratorNames.begin());
   if (!options.size.empty()) options.job.size = parseSize(options.size);
   std::optional<oneapi::tbb::global_control> limit;
   if (options.threads > 0) limit.emplace(oneapi::tbb::global_control::max_allowed_parallelism, options.threads);

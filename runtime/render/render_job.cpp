@@ -1,7 +1,12 @@
 #include "runtime/render/render_job.h"
 
+#include <algorithm>
+#include <cctype>
 #include <chrono>
+#include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <cstring>
 #include <fstream>
 #include <memory>
 #include <stdexcept>
@@ -25,10 +30,34 @@ namespace lobe {
 namespace {
 
 constexpr const char* kTool = "loberender";
+constexpr std::int64_t kMaxPixels = 1 << 28;  // a film of more is a slip of the finger
 
 const char* nameOf(IntegratorKind kind) {
   constexpr std::array names{"path", "guided", "product"};
   return names[static_cast<std::size_t>(kind)];
+}
+
+/// As a shell takes it for one word.
+std::string quoted(const std::string& word) {
+  const auto plain = [](unsigned char c) { return std::isalnum(c) || c >= 0x80 || std::strchr("/._-=+,:@%", c); };
+  if (!word.empty() && std::ranges::all_of(word, plain)) return word;
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? "'\\''" : std::string(1, c);
+  return text + "'";
+}
+
+/// Every file a job writes can be written and is a file of its own: better said now than after hours.
+void checkFiles(const RenderJob& job) {
+  std::vector<std::filesystem::path> written = job.outputs;
+  for (const auto& path : {job.convergence, job.stats})
+    if (!path.empty()) written.push_back(path);
+  std::map<std::filesystem::path, int> uses;
+  for (const auto& path : {job.scene, job.reference})
+    if (!path.empty()) ++uses[std::filesystem::weakly_canonical(path)];
+  for (const auto& path : written)
+    if (++uses[std::filesystem::weakly_canonical(path)] > 1)
+      throw UsageError(fmt::format("{}: would be overwritten, it is named twice", path.string()));
+  for (const auto& path : written) checkWritable(path);
 }
 
 double peakResidentBytes() {
@@ -185,24 +214,31 @@ void RenderJob::validate() const {
   };
   require(samples.has_value() != seconds.has_value(), "either --spp or --seconds has to be given");
   require(!samples || *samples >= 1, "--spp has to be at least 1");
-  require(!seconds || *seconds > 0, "--seconds has to be over 0");
-  require(!size || (size->first >= 1 && size->second >= 1), "--size has to be at least 1x1");
+  require(!seconds || (*seconds > 0 && std::isfinite(*seconds)), "--seconds has to be over 0");
+  require(!size || (size->first >= 1 && size->second >= 1 && std::int64_t{size->first} * size->second <= kMaxPixels),
+          fmt::format("--size has to be at least 1x1 and at most {} pixels", kMaxPixels));
   require(!maxDepth || *maxDepth >= 1, "--max-depth has to be at least 1");
   require(trainingShare > 0 && trainingShare < 1, "--training-share has to be between 0 and 1");
   require(reference.empty() == convergence.empty(), "--reference and --convergence go together");
   require(!outputs.empty(), "-o is missing");
-  training.validate();
-  for (const auto& output : outputs) checkImageName(output);
+  try {
+    training.validate();
+    for (const auto& output : outputs) checkImageName(output);
+  } catch (const std::runtime_error& e) {
+    throw UsageError(e.what());  // rules of libraries, which know no command line
+  }
 }
 
 std::string lobefitCommand(const RenderJob& job) {
-  std::string command = fmt::format("lobefit {} -o {}", job.scene.string(), job.cacheFolder.string());
-  for (const auto& [name, value] : job.definitions) command += fmt::format(" -D {}={}", name, value);
+  std::string command = fmt::format("lobefit {} -o {}", quoted(job.scene.string()), quoted(job.cacheFolder.string()));
+  for (const auto& [name, value] : job.definitions) command += " -D " + quoted(name + "=" + value);
+  if (job.lenient) command += " --lenient";
   return command;
 }
 
 void run(const RenderJob& job) {
   job.validate();
+  checkFiles(job);
   const Scene scene = readFor(job);
   ConvergenceLog log(job, scene);
   Guiding guiding;

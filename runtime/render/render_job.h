@@ -33,7 +33,7 @@ struct RenderJob {
 
   std::filesystem::path reference, convergence, stats;  ///< empty: not wanted
 
-  /// Throws std::runtime_error that names the option.
+  /// Throws UsageError that names the option.
   void validate() const;
 };
 
