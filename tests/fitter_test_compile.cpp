@@ -1,13 +1,8 @@
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 
 #include <tbb/global_control.h>
 #include <nlohmann/json.hpp>
@@ -17,26 +12,13 @@
 #include "scenes/tool.h"
 #include "schema/atomic_file.h"
 #include "tests/fitter_test_lobes.h"
+#include "tests/tool_run.h"
 
 using namespace lobe;
+using namespace lobe::test;
 namespace fs = std::filesystem;
 
 namespace {
-
-struct TemporaryFolder {
-  fs::path path;
-  TemporaryFolder() {
-    std::string name = (fs::temp_directory_path() / "lobe-fitter-XXXXXX").string();
-    REQUIRE(mkdtemp(name.data()) != nullptr);
-    path = name;
-  }
-  ~TemporaryFolder() { fs::remove_all(path); }
-};
-
-std::string readFile(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 Scene sceneOf(const std::vector<std::pair<std::string, BsdfPtr>>& materials) {
   Scene scene;
@@ -73,10 +55,10 @@ TEST_CASE("fitter: equal lobes are fitted once, whatever the material") {
 }
 
 TEST_CASE("fitter: what is up to date is left alone, what is not says why") {
-  const TemporaryFolder folder;
+  const Folder folder;
   const std::vector<LobeUse> uses =
       collectLobes(sceneOf({{"iso", roughConductor(0.3, 0.3)}, {"aniso", roughConductor(0.1, 0.3)}}));
-  CompileOptions options = quickOptions(folder.path);
+  CompileOptions options = quickOptions(folder.path());
   std::vector<CompileJob> jobs = planCompile(uses, options);
   REQUIRE(jobs.size() == 2);
   CHECK((jobs[0].grid.kind == GridKind::elevation && jobs[1].grid.kind == GridKind::fibonacci));
@@ -89,7 +71,7 @@ TEST_CASE("fitter: what is up to date is left alone, what is not says why") {
   options.force = false;
   options.settings.components = 4;
   CHECK(planCompile(uses, options)[0].stale == "other fit settings");
-  options = quickOptions(folder.path);
+  options = quickOptions(folder.path());
   options.elevations = 7;
   jobs = planCompile(uses, options);
   CHECK(jobs[0].stale == "another grid of directions");
@@ -99,14 +81,14 @@ TEST_CASE("fitter: what is up to date is left alone, what is not says why") {
 }
 
 TEST_CASE("fitter: the same bytes from any number of threads") {
-  const TemporaryFolder folder;
+  const Folder folder;
   const std::vector<LobeUse> uses =
       collectLobes(sceneOf({{"iso", roughConductor(0.3, 0.3)}, {"aniso", roughConductor(0.1, 0.3)}}));
   std::array<std::vector<std::string>, 2> contents;
   for (const std::size_t threads : {1u, 2u}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    CompileOptions options = quickOptions(folder.path);
-    options.directory = folder.path / std::to_string(threads);
+    CompileOptions options = quickOptions(folder.path());
+    options.directory = folder / std::to_string(threads);
     const std::vector<CompileJob> jobs = planCompile(uses, options);
     runAll(jobs);
     for (const CompileJob& job : jobs) contents[threads - 1].push_back(readFile(job.path));
@@ -116,7 +98,7 @@ TEST_CASE("fitter: the same bytes from any number of threads") {
 }
 
 TEST_CASE("fitter: the summary of a cache is that of its records") {
-  const TemporaryFolder folder;
+  const Folder folder;
   LobeCacheInfo info;
   info.model = info.key = info.summary = info.toolVersion = "x";
   info.gridCount = 3;
@@ -124,8 +106,8 @@ TEST_CASE("fitter: the summary of a cache is that of its records") {
   const CacheComponent half{0.5f, 0, 0, 0.1f, 0, 0.1f};
   const std::vector<CacheRecord> records{
       {0, 1, 1, 1, 0.5f, 0.1f, 0.3f, 0.4f}, {1, 2, 1, 1, 0.5f, 0.3f, 0.1f, 0.6f}, {0, 1, 1, 1, 0.5f, 0.2f, 0.2f, 0.5f}};
-  writeAtomically(folder.path / "x.lobe", encodeLobeCache(info, records, std::vector{c, half, half}));
-  const CacheSummary s = summarise(LobeCache::open(folder.path / "x.lobe"));
+  writeAtomically(folder / "x.lobe", encodeLobeCache(info, records, std::vector{c, half, half}));
+  const CacheSummary s = summarise(LobeCache::open(folder / "x.lobe"));
   CHECK(s.records == 3);
   CHECK(s.meanComponents == Approx(4.0 / 3));
   CHECK(s.nevMedian == Approx(0.2));
@@ -159,23 +141,6 @@ TEST_CASE("fitter: options out of range are named") {
 
 namespace {
 
-struct ToolResult {
-  int code;
-  std::string out, error;
-};
-
-/// Runs one of our binaries with its output caught in the folder.
-ToolResult runBinary(const fs::path& folder, const std::string& arguments) {
-  const fs::path out = folder / "out", error = folder / "error";
-  const std::string command = "cd " + folder.string() + " && " + LOBE_BIN_DIR "/" + arguments + " >out 2>error";
-  const int status = std::system(command.c_str());
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, readFile(out), readFile(error)};
-}
-
-long lineCount(const std::string& text) {
-  return std::ranges::count(text, '\n');
-}
-
 const char* const kTwoMaterials = R"(<scene version="0.6.0">
   <bsdf type="roughconductor" id="Steel"><string name="distribution" value="ggx"/>
     <float name="alpha" value="$roughness"/></bsdf>
@@ -189,34 +154,34 @@ const char* const kTwoMaterials = R"(<scene version="0.6.0">
 }  // namespace
 
 TEST_CASE("fitter: lobefit compiles a scene, then has nothing to do; lobedump shows what it made") {
-  const TemporaryFolder folder;
-  writeAtomically(folder.path / "scene.xml", std::string(kTwoMaterials));
+  const Folder folder;
+  writeAtomically(folder / "scene.xml", std::string(kTwoMaterials));
   const std::string fit = "lobefit scene.xml -D roughness=0.3 --elevations 4 --samples 256";
-  ToolResult r = runBinary(folder.path, fit + " --json");
+  ToolRun r = runBinary(folder.path(), fit + " --json");
   CHECK(r.code == 0);
   CHECK_THAT(r.error, Catch::Contains("1 of 1 lobes written to lobes"));
   const auto json = nlohmann::json::parse(r.out);
   REQUIRE(json.size() == 1);
   CHECK(json[0]["materials"] == nlohmann::json({"Steel", "Again"}));
   CHECK(json[0]["records"] == 4);
-  r = runBinary(folder.path, fit);
+  r = runBinary(folder.path(), fit);
   CHECK(r.code == 0);
   CHECK_THAT(r.error, Catch::Contains("nothing to do"));
   CHECK_THAT(r.out, Catch::Contains("Steel + 1 more") && Catch::Contains("up to date"));
 
-  r = runBinary(folder.path, "lobedump lobes/*.lobe --records");
+  r = runBinary(folder.path(), "lobedump lobes/*.lobe --records");
   CHECK(r.code == 0);
   CHECK(lineCount(r.out) == 6 + 5 + 1 + 2);  // header, records, gap, table
-  r = runBinary(folder.path, "lobedump --json lobes/*.lobe");
+  r = runBinary(folder.path(), "lobedump --json lobes/*.lobe");
   CHECK(nlohmann::json::parse(r.out)[0]["records"].size() == 4);
 }
 
 TEST_CASE("fitter: tools refuse bad input with one line") {
-  const TemporaryFolder folder;
-  writeAtomically(folder.path / "scene.xml", std::string(kTwoMaterials));
-  writeAtomically(folder.path / "broken.xml", std::string("<scene><bsdf type='diffuse'></scene>"));
-  writeAtomically(folder.path / "no.lobe", std::string("something else"));
-  writeAtomically(folder.path / "empty.lobe", std::string());
+  const Folder folder;
+  writeAtomically(folder / "scene.xml", std::string(kTwoMaterials));
+  writeAtomically(folder / "broken.xml", std::string("<scene><bsdf type='diffuse'></scene>"));
+  writeAtomically(folder / "no.lobe", std::string("something else"));
+  writeAtomically(folder / "empty.lobe", std::string());
   const std::pair<const char*, int> cases[] = {{"lobefit", 2},
                                                {"lobefit scene.xml --components 0 -D roughness=1", 2},
                                                {"lobefit scene.xml --samples many", 2},
@@ -233,14 +198,14 @@ TEST_CASE("fitter: tools refuse bad input with one line") {
                                                {"lobedump empty.lobe", 1},
                                                {"lobedump .", 1}};
   for (const auto& [arguments, code] : cases) {
-    const ToolResult r = runBinary(folder.path, arguments);
+    const ToolRun r = runBinary(folder.path(), arguments);
     CAPTURE(arguments, r.error);
     CHECK(r.code == code);
     CHECK(lineCount(r.error) == 1);
     CHECK_THAT(r.error, Catch::Contains(": error: "));
     CHECK(r.out.empty());
   }
-  CHECK(!fs::exists(folder.path / "lobes"));
+  CHECK(!fs::exists(folder / "lobes"));
 }
 
 TEST_CASE("fitter: tools end with the exit code that fits and say why in one line") {

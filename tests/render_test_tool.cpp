@@ -1,11 +1,9 @@
 // lobecompare as its users see it: output, exit codes, one-line errors.
 
-#include <cstdio>
 #include <filesystem>
 #include <string>
 
 #include <fmt/format.h>
-#include <sys/wait.h>
 #include <nlohmann/json.hpp>
 
 #include "render_test_tools.h"
@@ -16,20 +14,8 @@ using namespace lobe::test;
 
 namespace {
 
-struct ToolRun {
-  int code;
-  std::string output;  // stdout and stderr
-};
-
 ToolRun lobecompare(const std::string& arguments) {
-  const std::string command = fmt::format("{}/lobecompare {} 2>&1", LOBE_BIN_DIR, arguments);
-  std::FILE* pipe = popen(command.c_str(), "r");
-  REQUIRE(pipe);
-  std::string output;
-  char buffer[4096];
-  while (const std::size_t n = std::fread(buffer, 1, sizeof buffer, pipe)) output.append(buffer, n);
-  const int status = pclose(pipe);
-  return {WEXITSTATUS(status), output};
+  return runBinary(".", "lobecompare " + arguments);
 }
 
 }  // namespace
@@ -42,7 +28,7 @@ TEST_CASE("render: lobecompare tells errors to people and machines") {
   SECTION("numbers") {
     const ToolRun run = lobecompare(reference + " " + image + " " + reference + " --json");
     REQUIRE(run.code == 0);
-    const auto json = nlohmann::json::parse(run.output);
+    const auto json = nlohmann::json::parse(run.out);
     REQUIRE(json.size() == 2);
     CHECK(json[0]["image"] == image);
     CHECK(json[0]["mse"].get<double>() == Approx(0.01));
@@ -52,7 +38,7 @@ TEST_CASE("render: lobecompare tells errors to people and machines") {
     CHECK(json[0]["mean_ratio"].get<double>() == Approx(1.2));
     CHECK(json[0]["nonfinite"] == 0);
     CHECK(json[1]["mse"] == 0);
-    CHECK(lobecompare(reference + " " + image).output.find("0.01") != std::string::npos);
+    CHECK(lobecompare(reference + " " + image).out.find("0.01") != std::string::npos);
   }
   SECTION("map") {
     const std::string map = folder / "map.png";
@@ -60,6 +46,9 @@ TEST_CASE("render: lobecompare tells errors to people and machines") {
     CHECK(readImage(map).width == 10);
     CHECK(lobecompare(reference + " " + image + " " + image + " --map " + map).code == 2);
     CHECK(lobecompare(reference + " " + image + " --map map.jpg").code == 2);
+    const ToolRun unwritable = lobecompare(reference + " " + image + " --map /nowhere/map.png");
+    CHECK(unwritable.code == 1);
+    CHECK(unwritable.error.find("lobecompare: error: /nowhere/map.png: cannot write") == 0);
   }
   SECTION("faults") {
     CHECK(lobecompare("").code == 2);
@@ -69,10 +58,10 @@ TEST_CASE("render: lobecompare tells errors to people and machines") {
     writeImage(other, Image(9, 10));
     const ToolRun sizes = lobecompare(reference + " " + other);
     CHECK(sizes.code == 1);
-    CHECK(sizes.output ==
+    CHECK(sizes.error ==
           fmt::format("lobecompare: error: {}: the image has 9x10 pixels, the reference 10x10\n", other));
     const ToolRun missing = lobecompare(reference + " " + (folder / "missing.exr").string());
     CHECK(missing.code == 1);
-    CHECK(missing.output.find("missing.exr") != std::string::npos);
+    CHECK(missing.error.find("missing.exr") != std::string::npos);
   }
 }

@@ -2,17 +2,15 @@
 // Scenes made in code, plain materials and statistics for the render tests.
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <string>
-
-#include <unistd.h>
 
 #include <catch2/catch.hpp>
 
 #include "materials/sampling.h"
 #include "runtime/render/path_integrator.h"
+#include "tests/tool_run.h"
 
 namespace lobe::test {
 
@@ -148,25 +146,5 @@ inline Moments estimate(const Integrator& integrator, const Ray& ray, int n, std
   }
   return moments;
 }
-
-/// A folder of a test's own, removed with everything in it.
-class Folder {
- public:
-  Folder() {
-    std::string name = (std::filesystem::temp_directory_path() / "lobe-render-XXXXXX").string();
-    REQUIRE(mkdtemp(name.data()) != nullptr);
-    path_ = name;
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  ~Folder() { std::filesystem::remove_all(path_); }
-  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-  long files() const {
-    return std::distance(std::filesystem::directory_iterator(path_), std::filesystem::directory_iterator());
-  }
-
- private:
-  std::filesystem::path path_;
-};
 
 }  // namespace lobe::test

@@ -44,15 +44,19 @@ void checkArguments(const Arguments& arguments) {
   if (std::filesystem::path(arguments.map).extension() != ".png") throw lobe::UsageError("--map is written as .png");
 }
 
-Comparison compare(const lobe::Image& reference, const std::string& name, const std::string& map) {
-  const lobe::Image image = lobe::readImage(name);
+lobe::ErrorMetrics measure(const lobe::Image& reference, const lobe::Image& image, const std::string& name) {
   try {
-    Comparison result{name, lobe::compareImages(reference, image)};
-    if (!map.empty()) lobe::writeErrorMap(map, reference, image);
-    return result;
+    return lobe::compareImages(reference, image);
   } catch (const std::runtime_error& e) {
     throw std::runtime_error(fmt::format("{}: {}", name, e.what()));
   }
+}
+
+Comparison compare(const lobe::Image& reference, const std::string& name, const std::string& map) {
+  const lobe::Image image = lobe::readImage(name);
+  Comparison result{name, measure(reference, image, name)};
+  if (!map.empty()) lobe::writeErrorMap(map, reference, image);
+  return result;
 }
 
 void printJson(const std::vector<Comparison>& comparisons) {
