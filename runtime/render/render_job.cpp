@@ -253,7 +253,8 @@ void run(const RenderJob& job) {
   const RenderResult rendered =
       renderWithProgress(job, camera, *integrator, guiding.training.report.seconds, film, log);
   const RunResult result{rendered, guiding, film.dropped()};
-  if (result.dropped > 0) printWarning(kTool, fmt::format("{} samples were not finite and left out", result.dropped));
+  if (result.dropped > 0)
+    printWarning(kTool, fmt::format("{} samples were negative or not finite and left out", result.dropped));
   for (const auto& output : job.outputs) writeImage(output, film.mean(), attributes(job, result));
   log.write();
   if (!job.stats.empty()) writeAtomically(job.stats, statistics(job, result).dump(2) + "\n");
