@@ -1,5 +1,6 @@
 #include "runtime/guiding/brdf_caches.h"
 
+#include <algorithm>
 #include <map>
 #include <numbers>
 #include <stdexcept>
@@ -50,6 +51,7 @@ BrdfCaches::BrdfCaches(const std::filesystem::path& folder, std::span<const Lobe
   }
   if (faults.empty()) return;
   std::vector<std::string> lines;
+  lines.reserve(faults.size());
   for (const auto& [message, materials] : faults)
     lines.push_back(fmt::format("{} (material {})", message, fmt::join(materials, ", ")));
   throw std::runtime_error(fmt::format("BRDF caches: {}; run: {}", fmt::join(lines, "; "), remedy));
@@ -69,7 +71,8 @@ void BrdfCaches::add(int lobe, const Vec3& wo, const Vec2& turn, float tint, Ref
   const std::span<Gaussian> room = std::span(reflectance.components).subspan(reflectance.count);
   if (fitted.size() > room.size()) return;
 
-  const float scale = 0.5f * tint * record.integral;  // ρ = integral · G / 2, because dω = 2 dA
+  // ρ = integral · G / 2, because dω = 2 dA, with G normalised over the disc: records are over the plane.
+  const float scale = 0.5f * tint * record.integral / std::max(1.0f - record.outside, 0.1f);
   for (Gaussian& g : alignMixture(entry.grid, index, fitted, query, room)) {
     if (!isotropic) g = rotated(g, turn);
     g.weight *= scale;
@@ -86,6 +89,7 @@ std::size_t BrdfCaches::bytes() const {
 
 std::vector<std::uint64_t> BrdfCaches::hashes() const {
   std::vector<std::uint64_t> all;
+  all.reserve(caches_.size());
   for (const Entry& e : caches_) all.push_back(e.cache.hash());
   return all;
 }

@@ -24,6 +24,7 @@ void require(bool condition, const char* field, const char* rule) {
 struct ParticlePositions {
   std::span<const Particle> particles;
   // The interface nanoflann asks of a data set; its names.
+  // NOLINTBEGIN(readability-identifier-naming)
   std::size_t kdtree_get_point_count() const { return particles.size(); }
   float kdtree_get_pt(std::size_t i, std::size_t axis) const {
     return particles[i].position[static_cast<Eigen::Index>(axis)];
@@ -32,6 +33,7 @@ struct ParticlePositions {
   bool kdtree_get_bbox(Box&) const {
     return false;
   }
+  // NOLINTEND(readability-identifier-naming)
 };
 
 using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, ParticlePositions>,
@@ -210,7 +212,7 @@ void IlluminationTrainer::rebuildCache() {
 
 double IlluminationTrainer::undersampledShare() const {
   if (records_.empty()) return 0;
-  const long limit = kUndersampledPerComponent * options_.components;
+  const int limit = kUndersampledPerComponent * options_.components;
   const auto few = std::ranges::count_if(records_, [&](const Training& t) { return t.em.samplesSeen() < limit; });
   return static_cast<double>(few) / static_cast<double>(records_.size());
 }

@@ -41,7 +41,7 @@ class Product {
   float constant_;
   float mass_ = 0;
   /// Weights of all pairs, illumination fastest (K2·k1 + k2); the last row is the constant's.
-  std::array<float, (kMaxReflectanceComponents + 1) * kMaxIlluminationComponents> pairs_;
+  std::array<float, std::size_t{kMaxReflectanceComponents + 1} * kMaxIlluminationComponents> pairs_;
 };
 
 }  // namespace lobe

@@ -56,7 +56,8 @@ std::optional<EmittedPhoton> EnvironmentGuide::sample(float choice, const Vec2& 
   const std::optional<EnvironmentSample> from = environment_.sample(pixels, u1);
   // Interpolation carries directions over a block's border; there the neighbour's photons do the work.
   if (!from || blockOf(from->wi) != index) return std::nullopt;
-  const Vec2 corner(static_cast<float>(cell % kCells), static_cast<float>(cell / kCells));
+  const int row = cell / kCells;
+  const Vec2 corner(static_cast<float>(cell % kCells), static_cast<float>(row));
   const Vec2 u = ((corner + u2) / kCells).cwiseMin(kOneMinusEpsilon);
   const float pdf = bins_.probability(bin) * kCells * kCells * from->pdf;
   if (!(pdf > 0)) return std::nullopt;
