@@ -10,8 +10,8 @@ namespace lobe {
 class Texture {
  public:
   virtual ~Texture() = default;
-  /// The linear colour at texture coordinate uv: any real numbers, the texture wraps as it is set to. v counts downwards
-  /// from an image's first row, as in Mitsuba; mesh readers hand out coordinates in this sense.
+  /// The linear colour at texture coordinate uv: any real numbers, the texture wraps as it is set to. v counts
+  /// downwards from an image's first row, as in Mitsuba; mesh readers hand out coordinates in this sense.
   virtual Rgb eval(const Vec2& uv) const = 0;
   /// The mean colour over one period, used for decisions that must not depend on where the surface is hit.
   virtual Rgb mean() const = 0;

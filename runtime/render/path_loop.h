@@ -62,9 +62,9 @@ class PathLoop {
     PathStatistics& statistics;
     Rgb radiance = Rgb::Zero();
     Rgb throughput = Rgb::Ones();
-    float pdf = 0;   // of the last direction; 0 after the camera or a delta part: emitter sampling could not find it
+    float pdf = 0;  // of the last direction; 0 after the camera or a delta part: emitter sampling could not find it
     Rgb expected = Rgb::Ones();  // product of the albedos met: what scattering leaves on average, whatever was sampled
-    float eta2 = 1;  // how much refraction has compressed radiance so far, which termination has to undo
+    float eta2 = 1;              // how much refraction has compressed radiance so far, which termination has to undo
     Vec3 previous = Vec3::Zero();
     int depth = 0;
   };
