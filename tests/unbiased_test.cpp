@@ -11,28 +11,17 @@
 
 #include <oneapi/tbb/global_control.h>
 
-#include <unistd.h>
-
 #include "fitter/compile.h"
 #include "runtime/render/path_integrator.h"
 #include "runtime/render/renderer.h"
 #include "runtime/render/training.h"
 #include "scenes/camera.h"
 #include "scenes/reader.h"
+#include "tests/tool_run.h"
 
 using namespace lobe;
 
 namespace {
-
-/// A folder of this test's own, removed at its end.
-struct TemporaryFolder {
-  std::filesystem::path path;
-  TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "lobe-unbiased-XXXXXX").string();
-    path = mkdtemp(name.data());
-  }
-  ~TemporaryFolder() { std::filesystem::remove_all(path); }
-};
 
 /// Everything that rendering a scene by every integrator takes, with coarse caches and little training: estimates have
 /// to be right however rough the mixtures are.
@@ -45,7 +34,7 @@ class Studio {
     renderScene_.emplace(scene_);
     camera_.emplace(scene_.camera, scene_.filter);
     CompileOptions options;
-    options.directory = folder_.path / "lobes";
+    options.directory = folder_ / "lobes";
     options.settings.samples = 512;
     options.settings.components = 4;
     options.elevations = 12;
@@ -77,7 +66,7 @@ class Studio {
   const IlluminationCache& illumination() const { return illumination_; }
 
  private:
-  TemporaryFolder folder_;
+  lobe::test::Folder folder_;
   Scene scene_;
   std::optional<RenderScene> renderScene_;
   std::optional<PinholeCamera> camera_;
@@ -175,13 +164,13 @@ TEST_CASE("unbiased: path, guided and product agree on the demo scene", "[slow]"
 }
 
 TEST_CASE("unbiased: inside a glowing box radiance is emission over absorption", "[slow]") {
-  const TemporaryFolder folder;
-  std::ofstream(folder.path / "furnace.xml") << R"(<scene version="3.0.0">
+  const lobe::test::Folder folder;
+  std::ofstream(folder / "furnace.xml") << R"(<scene version="3.0.0">
     <sensor type="perspective"><float name="fov" value="70"/></sensor>
     <shape type="cube"><boolean name="flip_normals" value="true"/>
       <bsdf type="diffuse"><rgb name="reflectance" value="0.6, 0.6, 0.6"/></bsdf>
       <emitter type="area"><rgb name="radiance" value="0.8, 0.8, 0.8"/></emitter></shape></scene>)";
-  const Studio studio(readScene(folder.path / "furnace.xml"), 30, 20);
+  const Studio studio(readScene(folder / "furnace.xml"), 30, 20);
   for (const auto& film : {studio.render(studio.path(), 256, 6), studio.render(studio.guided(), 256, 7),
                            studio.render(studio.product(), 256, 8)}) {
     const auto found = blocks(film, 5);
@@ -223,15 +212,15 @@ double reflected(const Studio& studio, const Vec3& wo) {
 }  // namespace
 
 TEST_CASE("unbiased: a glossy plate under a bright spot reflects what the integral says", "[slow]") {
-  const TemporaryFolder folder;
+  const lobe::test::Folder folder;
   // Seen from 50° through a narrow lens: wo hardly varies over the picture.
-  std::ofstream(folder.path / "plate.xml") << R"(<scene version="3.0.0">
+  std::ofstream(folder / "plate.xml") << R"(<scene version="3.0.0">
     <sensor type="perspective"><float name="fov" value="0.5"/>
       <transform name="to_world"><lookat origin="-7.66044, 0, 6.42788" target="0, 0, 0" up="0, 0, 1"/></transform></sensor>
     <shape type="rectangle">
       <bsdf type="roughconductor"><string name="distribution" value="ggx"/><float name="alpha" value="0.25"/>
         <rgb name="eta" value="0.2, 0.2, 0.2"/><rgb name="k" value="3.9, 3.9, 3.9"/></bsdf></shape></scene>)";
-  Scene scene = readScene(folder.path / "plate.xml");
+  Scene scene = readScene(folder / "plate.xml");
   scene.environment = Environment{spotImage()};
   const Studio studio(std::move(scene), 20, 20);
   REQUIRE(!studio.illumination().records().empty());
