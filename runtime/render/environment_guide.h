@@ -4,8 +4,8 @@
 //
 // A histogram over blocks of directions × cells of the disc that the scene's bounding sphere shows to each; within a
 // block directions follow the environment's radiance. Photons start only where importons have left: one from elsewhere
-// would weigh as much as hundreds of them, and spoil the records it meets. (Measured: a share of 0.1 for all directions
-// costs a fifth of the gain in the kitchen.)
+// would weigh as much as hundreds of them. (Measured in the kitchen at 16 samples per pixel: relMSE without
+// the worst 1 % of pixels 0.403 with a share of 0.1 for all directions, 0.395 without.)
 
 #include <optional>
 #include <vector>

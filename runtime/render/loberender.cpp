@@ -44,7 +44,9 @@ void declareTraining(CLI::App& app, RenderJob& job) {
 void declare(CLI::App& app, Options& options) {
   RenderJob& job = options.job;
   app.add_option("scene", job.scene, "Mitsuba scene file (XML)")->required();
-  app.add_option("-o,--output", job.outputs, "Picture, .exr or .png; may be given several times")->required();
+  app.add_option("-o,--output", job.outputs, "Picture, .exr or .png; may be given several times")
+      ->allow_extra_args(false)  // else it would swallow the scene's name after it
+      ->required();
   app.add_option("--cache", job.cacheFolder, "Folder of the caches that lobefit made")->capture_default_str();
   app.add_option("--integrator", options.integrator, "path, guided or product")
       ->check(CLI::IsMember(kIntegratorNames))
