@@ -38,13 +38,17 @@ struct LobeTint {
   float tint;
 };
 
-/// Most lobes that a BSDF may have; look-ups use fixed arrays of this size.
+/// Most lobes that take part at one point; look-ups use fixed arrays of this size. A BSDF may have more, of which
+/// another few matter elsewhere on its surface.
 inline constexpr int kMaxLobes = 4;
 
 struct LobeMixture {
   std::array<LobeTint, kMaxLobes> glossy;
   int glossyCount = 0;
   float constant = 0;  ///< albedo of the constant (diffuse) reflection, luminance
+  /// Share in [0,1] of the smooth part's albedo that goes to the other side of the surface, which nothing above
+  /// describes.
+  float transmittedShare = 0;
 };
 
 class Bsdf {

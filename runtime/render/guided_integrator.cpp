@@ -25,6 +25,13 @@ Eigen::Matrix3f guideAxes(const SurfaceHit& hit, const IlluminationRecord& recor
   return axes;
 }
 
+/// What was learnt is about the side of wo only: a share of the samples that may go through the surface is the BSDF's.
+StrategyShares onReflectedSide(const StrategyShares& shares, float transmittedShare) {
+  const float reflected = 1 - transmittedShare;
+  return {reflected * shares.product, 1 - reflected * (shares.product + shares.illumination),
+          reflected * shares.illumination};
+}
+
 }  // namespace
 
 std::vector<LobeRequest> lobeRequests(const Scene& scene) {
@@ -49,17 +56,17 @@ GuidedSampler::Vertex::Vertex(const GuidedSampler& sampler, const SurfaceHit& hi
   const IlluminationRecord* record = sampler.illumination_.find(hit.position, side * hit.normal);
   if (!record) return;
   axes_ = guideAxes(hit, *record, side);
-  if (!sampler.caches_) {
-    density_.emplace(reflectance_, *record, kGuidedShares);
-    return;
+  const LobeMixture mixture = hit.bsdf->mixture(hit.wo, hit.uv);
+  StrategyShares shares = kGuidedShares;
+  if (sampler.caches_) {
+    collectReflectance(sampler, hit, mixture, side);
+    shares = record->samples < kUncertainSamples ? kUncertainProductShares : kProductShares;
   }
-  collectReflectance(sampler, hit, side);
-  density_.emplace(reflectance_, *record,
-                   record->samples < kUncertainSamples ? kUncertainProductShares : kProductShares);
+  density_.emplace(reflectance_, *record, onReflectedSide(shares, mixture.transmittedShare));
 }
 
-void GuidedSampler::Vertex::collectReflectance(const GuidedSampler& sampler, const SurfaceHit& hit, float side) {
-  const LobeMixture mixture = hit.bsdf->mixture(hit.wo, hit.uv);
+void GuidedSampler::Vertex::collectReflectance(const GuidedSampler& sampler, const SurfaceHit& hit,
+                                               const LobeMixture& mixture, float side) {
   reflectance_.constant = mixture.constant * kInvPi;
   reflectance_.backgroundMass = reflectance_.constant;
   // On the back, lobes see the frame (s, −t, −n). The lobes we have are symmetric in t, so that this is theirs as well

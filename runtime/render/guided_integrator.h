@@ -30,7 +30,8 @@ class GuidedSampler {
     bool guided() const { return density_.has_value(); }
 
    private:
-    void collectReflectance(const GuidedSampler& sampler, const SurfaceHit& hit, float side);
+    void collectReflectance(const GuidedSampler& sampler, const SurfaceHit& hit, const LobeMixture& mixture,
+                            float side);
     Vec3 toGuide(const Vec3& wi) const { return axes_ * wi; }
 
     const SurfaceHit& hit_;
