@@ -2,6 +2,7 @@
 
 #include "materials/frame.h"
 #include "materials/models.h"
+#include "materials/nested_bsdf.h"
 
 namespace lobe {
 namespace {
@@ -10,10 +11,10 @@ namespace {
 /// above the rounding of coordinates of a few units.
 constexpr float kHalfStep = 0x1p-13f;
 
-class BumpMap final : public Bsdf {
+class BumpMap final : public NestedBsdf {
  public:
   BumpMap(BsdfPtr nested, TexturePtr displacement, float scale)
-      : nested_(std::move(nested)), displacement_(std::move(displacement)), scale_(scale) {}
+      : NestedBsdf(std::move(nested)), displacement_(std::move(displacement)), scale_(scale) {}
 
   Vec3 perturbedNormal(const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const override {
     // The displaced position is p + h(u,v) z; its derivatives, curvature of the base left out, span the new tangent
@@ -22,25 +23,11 @@ class BumpMap final : public Bsdf {
     const Vec3 dv(dpdv.x(), dpdv.y(), derivative(uv, Vec2(0.0f, kHalfStep)));
     const Vec3 cross = du.cross(dv);
     const float length = cross.norm();
-    if (!(length > 0.0f) || cross.z() == 0.0f) return nested_->perturbedNormal(uv, dpdu, dpdv);
+    if (!(length > 0.0f) || cross.z() == 0.0f) return nested().perturbedNormal(uv, dpdu, dpdv);
     const Vec3 normal = cross / (cross.z() > 0.0f ? length : -length);  // mirrored coordinates turn it over
     const Frame frame = Frame::fromTangent(normal, du);
-    return frame.toWorld(nested_->perturbedNormal(uv, frame.toLocal(du), frame.toLocal(dv)));
+    return frame.toWorld(nested().perturbedNormal(uv, frame.toLocal(du), frame.toLocal(dv)));
   }
-
-  Rgb eval(const Vec3& wo, const Vec3& wi, const Vec2& uv) const override { return nested_->eval(wo, wi, uv); }
-  std::optional<BsdfSample> sample(const Vec3& wo, const Vec2& uv, float choice, const Vec2& u) const override {
-    return nested_->sample(wo, uv, choice, u);
-  }
-  float pdf(const Vec3& wo, const Vec3& wi, const Vec2& uv) const override { return nested_->pdf(wo, wi, uv); }
-  std::optional<DeltaSample> sampleDelta(const Vec3& wo, const Vec2& uv, float choice) const override {
-    return nested_->sampleDelta(wo, uv, choice);
-  }
-  float deltaProbability(const Vec3& wo, const Vec2& uv) const override { return nested_->deltaProbability(wo, uv); }
-  std::span<const LobePtr> lobes() const override { return nested_->lobes(); }
-  LobeMixture mixture(const Vec3& wo, const Vec2& uv) const override { return nested_->mixture(wo, uv); }
-  Rgb albedo(const Vec3& wo, const Vec2& uv) const override { return nested_->albedo(wo, uv); }
-  bool transmits() const override { return nested_->transmits(); }
 
  private:
   /// By central differences of the displacement's luminance, over the step as it came out in floating point.
@@ -52,7 +39,6 @@ class BumpMap final : public Bsdf {
   }
   float height(const Vec2& uv) const { return luminance(displacement_->eval(uv)); }
 
-  BsdfPtr nested_;
   TexturePtr displacement_;
   float scale_;
 };

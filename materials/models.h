@@ -5,11 +5,16 @@
 
 namespace lobe {
 
+BsdfPtr makeBlend(const Parameters& parameters);
 BsdfPtr makeBumpMap(const Parameters& parameters);
 BsdfPtr makeConductor(const Parameters& parameters);
 BsdfPtr makeDielectric(const Parameters& parameters);
+BsdfPtr makeDiffTrans(const Parameters& parameters);
 BsdfPtr makeDiffuse(const Parameters& parameters);
 BsdfPtr makeMask(const Parameters& parameters);
+BsdfPtr makeMixture(const Parameters& parameters);
+BsdfPtr makeNormalMap(const Parameters& parameters);
+BsdfPtr makeNull(const Parameters& parameters);
 BsdfPtr makePlastic(const Parameters& parameters);
 BsdfPtr makeRoughConductor(const Parameters& parameters);
 BsdfPtr makeRoughPlastic(const Parameters& parameters);

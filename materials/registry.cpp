@@ -16,11 +16,16 @@ struct Entry {
 
 // Sorted by name: knownBsdfs promises it.
 constexpr std::array kModels = {
+    Entry{"blendbsdf", makeBlend},
     Entry{"bumpmap", makeBumpMap},
     Entry{"conductor", makeConductor},
     Entry{"dielectric", makeDielectric},
+    Entry{"difftrans", makeDiffTrans},
     Entry{"diffuse", makeDiffuse},
     Entry{"mask", makeMask},
+    Entry{"mixturebsdf", makeMixture},
+    Entry{"normalmap", makeNormalMap},
+    Entry{"null", makeNull},
     Entry{"plastic", makePlastic},
     Entry{"roughconductor", makeRoughConductor},
     Entry{"roughplastic", makeRoughPlastic},

@@ -76,7 +76,9 @@ BsdfPtr makeTwoSided(const Parameters& parameters) {
   if (children.empty() || children.size() > 2)
     throw ParameterError("", "twosided needs one nested bsdf, or two for front and back");
   for (const BsdfPtr& child : children)
-    if (child->transmits()) throw ParameterError("", "twosided cannot hold a bsdf that transmits light");
+    if (child->transmits())
+      throw ParameterError("",
+                           "twosided cannot hold a bsdf that transmits light; a mask goes around it: mask > twosided");
   return std::make_shared<TwoSided>(children.front(), children.back());
 }
 

@@ -18,7 +18,7 @@ bool namesImage(pugi::xml_node node, bool environment) {
 }
 
 /// The parameters that matter here, as far as they make sense; faults are found later, when the element is read.
-std::optional<ImageRequest> peek(const ReadContext& context, pugi::xml_node node) {
+std::optional<ImageRequest> peek(const ReadContext& context, pugi::xml_node node, bool linear) {
   Parameters parameters;
   for (const pugi::xml_node child : node.children()) {
     const std::string name = normalisedName(child.attribute("name").value());
@@ -27,6 +27,7 @@ std::optional<ImageRequest> peek(const ReadContext& context, pugi::xml_node node
     if (const std::optional<bool> raw = parseBoolean(value); raw && name == "raw") parameters.set(name, *raw);
     if (const std::optional<double> gamma = parseNumber(value); gamma && name == "gamma") parameters.set(name, *gamma);
   }
+  if (linear) parameters.set("raw", true);
   try {
     return imageRequest(context, parameters);
   } catch (const ParameterError&) {
@@ -34,10 +35,16 @@ std::optional<ImageRequest> peek(const ReadContext& context, pugi::xml_node node
   }
 }
 
-void collect(const ReadContext& context, pugi::xml_node node, std::vector<ImageRequest>& requests) {
+bool isNormalMap(pugi::xml_node node) {
+  return elementName(node) == "bsdf" && std::string_view(node.attribute("type").value()) == "normalmap";
+}
+
+/// linear: the node's images are read without regard to what they say of their encoding.
+void collect(const ReadContext& context, pugi::xml_node node, bool linear, std::vector<ImageRequest>& requests) {
   if (namesImage(node, context.options.geometry))
-    if (const std::optional<ImageRequest> request = peek(context, node)) requests.push_back(*request);
-  for (const pugi::xml_node child : node.children()) collect(context, child, requests);
+    if (const std::optional<ImageRequest> request = peek(context, node, linear)) requests.push_back(*request);
+  for (const pugi::xml_node child : node.children())
+    collect(context, child, elementName(child) == "texture" && (linear || isNormalMap(node)), requests);
 }
 
 Encoding encodingOf(const Parameters& parameters) {
@@ -57,7 +64,7 @@ ImageRequest imageRequest(const ReadContext& context, const Parameters& paramete
 
 ImageStore::ImageStore(const ReadContext& context) {
   std::vector<ImageRequest> requests;
-  collect(context, context.file.scene(), requests);
+  collect(context, context.file.scene(), false, requests);
   std::vector<std::pair<ImageRequest, Entry*>> reads;
   for (const ImageRequest& request : requests)
     if (const auto [entry, isNew] = entries_.try_emplace(keyOf(request)); isNew)

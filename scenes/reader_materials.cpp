@@ -36,8 +36,10 @@ BsdfPtr MaterialReader::make(pugi::xml_node node) {
                          "diffuse 0.5 is used");
     return makeDiffuseOf(0.5f);
   }
-  const auto onChild = [this](pugi::xml_node child, const std::string& name, Parameters& parameters) {
-    if (elementName(child) != "bsdf") return textures_.take(child, name, parameters);
+  // Directions are no colours.
+  const Encoded encoded = type == "normalmap" ? Encoded::linear : Encoded::asGiven;
+  const auto onChild = [&](pugi::xml_node child, const std::string& name, Parameters& parameters) {
+    if (elementName(child) != "bsdf") return textures_.take(child, name, parameters, encoded);
     parameters.addChild(read(child));
     return true;
   };

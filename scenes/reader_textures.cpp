@@ -84,24 +84,24 @@ TexturePtr makeScaled(const Parameters& parameters) {
 
 }  // namespace
 
-TexturePtr TextureReader::read(pugi::xml_node node) {
-  const auto [entry, isNew] = done_.try_emplace(SceneFile::location(node));
+TexturePtr TextureReader::read(pugi::xml_node node, Encoded encoded) {
+  const auto [entry, isNew] = done_.try_emplace({SceneFile::location(node), encoded});
   if (isNew)
-    entry->second = make(node);
+    entry->second = make(node, encoded);
   else if (!entry->second)
     context_.file.fail(node, "a texture that refers to itself");
   return entry->second;
 }
 
-bool TextureReader::take(pugi::xml_node child, const std::string& name, Parameters& parameters) {
+bool TextureReader::take(pugi::xml_node child, const std::string& name, Parameters& parameters, Encoded encoded) {
   if (elementName(child) != "texture") return false;
   const std::string key = name.empty() ? "texture" : name;
   if (parameters.has(key)) context_.file.fail(child, fmt::format("the parameter \"{}\" is given twice", key));
-  parameters.set(key, read(child), SceneFile::location(child));
+  parameters.set(key, read(child, encoded), SceneFile::location(child));
   return true;
 }
 
-TexturePtr TextureReader::make(pugi::xml_node node) {
+TexturePtr TextureReader::make(pugi::xml_node node, Encoded encoded) {
   const std::string type = typeOf(context_, node);
   if (type != "bitmap" && type != "checkerboard" && type != "scale") {
     context_.unsupported(node, "texture " + type,
@@ -109,9 +109,10 @@ TexturePtr TextureReader::make(pugi::xml_node node) {
                          "grey is used");
     return constantTexture(grey(kPlainGrey));
   }
-  const Parameters parameters = readParameters(
+  Parameters parameters = readParameters(
       context_, node, "texture",
-      [this](pugi::xml_node child, const std::string& name, Parameters& p) { return take(child, name, p); });
+      [&](pugi::xml_node child, const std::string& name, Parameters& p) { return take(child, name, p, encoded); });
+  if (type == "bitmap" && encoded == Encoded::linear) parameters.set("raw", true, parameters.location("raw"));
   return makeFrom(context_, node, parameters, [&](const Parameters& p) {
     if (type == "checkerboard") return makeCheckerboardFrom(p);
     return type == "scale" ? makeScaled(p) : makeFromBitmap(node, p);

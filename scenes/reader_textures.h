@@ -2,29 +2,33 @@
 // Texture elements of scene files.
 
 #include <map>
+#include <utility>
 
 #include "scenes/reader_images.h"
 
 namespace lobe {
 
+/// Whether a texture's images are encoded as they or the file say, or hold plain numbers whatever is said.
+enum class Encoded { asGiven, linear };
+
 class TextureReader {
  public:
   explicit TextureReader(ReadContext& context) : context_(context), images_(context) {}
 
-  /// bitmap, checkerboard or scale; each element is read once. Throws SceneError.
-  TexturePtr read(pugi::xml_node node);
+  /// bitmap, checkerboard or scale; each element is read once for each encoding. Throws SceneError.
+  TexturePtr read(pugi::xml_node node, Encoded encoded = Encoded::asGiven);
   ImageStore& images() { return images_; }
 
   /// Sets the parameter if the child is a texture, as a ChildHandler does.
-  bool take(pugi::xml_node child, const std::string& name, Parameters& parameters);
+  bool take(pugi::xml_node child, const std::string& name, Parameters& parameters, Encoded encoded = Encoded::asGiven);
 
  private:
-  TexturePtr make(pugi::xml_node node);
+  TexturePtr make(pugi::xml_node node, Encoded encoded);
   TexturePtr makeFromBitmap(pugi::xml_node node, const Parameters& parameters);
 
   ReadContext& context_;
   ImageStore images_;
-  std::map<std::ptrdiff_t, TexturePtr> done_;  // by place; null while being read
+  std::map<std::pair<std::ptrdiff_t, Encoded>, TexturePtr> done_;  // by place; null while being read
 };
 
 }  // namespace lobe

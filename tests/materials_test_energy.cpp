@@ -39,6 +39,9 @@ std::vector<Named> smoothModels() {
   const BsdfPtr back = models[4].bsdf;
   models.push_back({"twosided", bsdfOf("twosided", {}, {front, back})});
   models.push_back({"mask", bsdfOf("mask", {{"opacity", Rgb(0.3f, 0.6f, 0.9f)}}, {models.back().bsdf})});
+  models.push_back({"blendbsdf", bsdfOf("blendbsdf", {{"weight", 0.4}}, {models[1].bsdf, back})});
+  models.push_back({"mixturebsdf", bsdfOf("mixturebsdf", {{"weights", std::string("0.5 0.2 0.3")}},
+                                          {front, models[0].bsdf, models[1].bsdf})});
   return models;
 }
 

@@ -1,0 +1,71 @@
+// A weighted sum of several models, the same everywhere on the surface.
+
+#include <algorithm>
+#include <charconv>
+
+#include <fmt/format.h>
+
+#include "materials/models.h"
+#include "materials/weighted_bsdf.h"
+
+namespace lobe {
+namespace {
+
+class Mixture final : public WeightedBsdf {
+ public:
+  Mixture(const std::vector<BsdfPtr>& parts, const PartWeights& weights) : WeightedBsdf(parts), weights_(weights) {}
+
+ private:
+  PartWeights weights(const Vec2&) const override { return weights_; }
+
+  PartWeights weights_;
+};
+
+[[noreturn]] void refuse(const std::string& message) {
+  throw ParameterError("weights", message);
+}
+
+/// Numbers between commas, semicolons or blanks.
+std::vector<double> parseWeights(const std::string& text) {
+  constexpr std::string_view kSeparators = " \t\r\n,;";
+  std::vector<double> numbers;
+  for (std::size_t at = text.find_first_not_of(kSeparators); at != std::string::npos;) {
+    const std::size_t end = std::min(text.find_first_of(kSeparators, at), text.size());
+    double number = 0.0;
+    const auto [rest, error] = std::from_chars(text.data() + at, text.data() + end, number);
+    if (error != std::errc() || rest != text.data() + end || !(number >= 0.0 && number <= 1e6))
+      refuse(fmt::format("\"{}\" in weights is not a number of at least 0", text.substr(at, end - at)));
+    numbers.push_back(number);
+    at = text.find_first_not_of(kSeparators, end);
+  }
+  return numbers;
+}
+
+PartWeights readWeights(const Parameters& parameters, std::size_t parts) {
+  const std::vector<double> numbers = parseWeights(parameters.text("weights", ""));
+  if (numbers.size() != parts)
+    refuse(
+        fmt::format("mixturebsdf needs a weight for each nested bsdf, but there are {} for {}", numbers.size(), parts));
+  double total = 0.0;
+  for (const double number : numbers) total += number;
+  if (!(total > 0.0)) refuse("the sum of weights must be positive");
+  // As Mitsuba 0.6: what would add energy is scaled down, unless the file insists.
+  if (!parameters.flag("ensure_energy_conservation", true) && total > 1.0)
+    refuse(fmt::format("the sum of weights must be at most 1, not {}", total));
+  PartWeights weights{};
+  std::ranges::transform(numbers, weights.begin(),
+                         [&](double number) { return static_cast<float>(number / std::max(1.0, total)); });
+  return weights;
+}
+
+}  // namespace
+
+BsdfPtr makeMixture(const Parameters& parameters) {
+  const std::vector<BsdfPtr>& parts = parameters.children();
+  if (parts.empty() || parts.size() > kMaxParts)
+    throw ParameterError(
+        "", fmt::format("mixturebsdf needs 1 to {} nested bsdfs, but there are {}", kMaxParts, parts.size()));
+  return std::make_shared<Mixture>(parts, readWeights(parameters, parts.size()));
+}
+
+}  // namespace lobe

@@ -1,0 +1,109 @@
+// Materials in scene files of both dialects: nested models in their order, textures by name, encodings.
+
+#include <catch2/catch.hpp>
+
+#include "scenes_test_tools.h"
+
+namespace lobe {
+namespace {
+
+const Vec3 kUp = Vec3::UnitZ();
+
+BsdfPtr bsdfOf(const std::string& element) {
+  const Scene scene = readBody("<shape type=\"sphere\">" + element + "</shape>");
+  return scene.materials.at(0).bsdf;
+}
+
+std::string number(const std::string& name, const std::string& value) {
+  return "<float name=\"" + name + "\" value=\"" + value + "\"/>";
+}
+
+std::string diffuse(const std::string& reflectance) {
+  return "<bsdf type=\"diffuse\">" + number("reflectance", reflectance) + "</bsdf>";
+}
+
+float albedoAt(const BsdfPtr& bsdf, const Vec2& uv = Vec2(0.25f, 0.25f)) {
+  return bsdf->albedo(kUp, uv).x();
+}
+
+/// A 1×1 image of the grey as an uncompressed 24-bit BMP.
+std::string greyBmp(char value) {
+  std::string bytes("BM\x3a\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\x01\0\0\0\x01\0\0\0\x01\0\x18\0\0\0\0\0\x04\0\0\0", 38);
+  bytes += std::string(16, '\0');
+  return bytes + std::string(3, value) + '\0';
+}
+
+}  // namespace
+
+TEST_CASE("scenes: null and difftrans") {
+  CHECK(bsdfOf("<bsdf type=\"null\"/>")->deltaProbability(kUp, Vec2::Zero()) == 1.0f);
+  CHECK(albedoAt(bsdfOf("<bsdf type=\"difftrans\"><spectrum name=\"transmittance\" value=\"0.3\"/></bsdf>")) ==
+        Approx(0.3f));
+  CHECK(faultOf("<bsdf type=\"null\"><float name=\"opacity\" value=\"1\"/></bsdf>").find("\"opacity\"") !=
+        std::string::npos);
+}
+
+TEST_CASE("scenes: blends keep the order of what is nested, whether written there or referred to") {
+  const std::string nested = diffuse("0.2") + diffuse("0.6");
+  for (const std::string& order : {number("weight", "0.25") + nested, nested + number("weight", "0.25")})
+    CHECK(albedoAt(bsdfOf("<bsdf type=\"blendbsdf\">" + order + "</bsdf>")) == Approx(0.3f));
+  const Scene scene = readBody(
+      "<shape type=\"sphere\"><bsdf type=\"blendbsdf\"><texture name=\"weight\" type=\"checkerboard\">"
+      "<rgb name=\"color0\" value=\"1\"/><rgb name=\"color1\" value=\"0\"/></texture>"
+      "<ref id=\"A\"/><ref name=\"bsdf_1\" id=\"B\"/></bsdf></shape>"
+      "<bsdf type=\"diffuse\" id=\"B\"><float name=\"reflectance\" value=\"0.8\"/></bsdf>"
+      "<bsdf type=\"diffuse\" id=\"A\"><float name=\"reflectance\" value=\"0.1\"/></bsdf>");
+  CHECK(albedoAt(scene.materials.at(0).bsdf, Vec2(0.25f, 0.25f)) == Approx(0.8f));
+  CHECK(albedoAt(scene.materials.at(0).bsdf, Vec2(0.75f, 0.25f)) == Approx(0.1f));
+  CHECK(faultOf("<bsdf type=\"blendbsdf\">" + diffuse("0.2") + "</bsdf>").find("two nested bsdfs") !=
+        std::string::npos);
+}
+
+TEST_CASE("scenes: mixtures") {
+  const BsdfPtr mixture = bsdfOf("<bsdf type=\"mixturebsdf\"><string name=\"weights\" value=\"0.5, 0.25\"/>" +
+                                 diffuse("0.2") + diffuse("0.8") + "</bsdf>");
+  CHECK(albedoAt(mixture) == Approx(0.3f));
+  const std::string fault = faultOf("<bsdf type=\"mixturebsdf\">\n<string name=\"weights\" value=\"0.5, b\"/>" +
+                                    diffuse("0.2") + diffuse("0.8") + "</bsdf>");
+  INFO(fault);
+  CHECK(fault.starts_with("test.xml:3:1: "));
+  CHECK(fault.find("\"b\"") != std::string::npos);
+}
+
+TEST_CASE("scenes: normal maps hold plain numbers whatever the file says; other textures stay colours") {
+  const TestFolder folder;
+  folder.write("grey.bmp", greyBmp('\xcc'));  // 0.8, which is 0.6 as a colour
+  const std::string file = "<string name=\"filename\" value=\"grey.bmp\"/>";
+  const auto leaning = [&](const std::string& texture, const std::string& rest = "") {
+    const Scene scene =
+        readScene(folder.write("test.xml", sceneOf("<shape type=\"sphere\"><bsdf type=\"normalmap\">" + texture +
+                                                   diffuse("0.5") + "</bsdf></shape>" + rest)));
+    return scene.materials.at(0).bsdf->perturbedNormal(Vec2(0.5f, 0.5f), Vec3::UnitX(), Vec3::UnitY());
+  };
+  const std::string scale = "<rgb name=\"scale\" value=\"0.625 0.625 1\"/>";  // 0.5, 0.5, 0.8: straight up
+  const auto scaled = [&](const std::string& bitmap) {
+    return "<texture name=\"normalmap\" type=\"scale\">" + scale + bitmap + "</texture>";
+  };
+  for (const std::string says :
+       {"", "<float name=\"gamma\" value=\"2.2\"/>", "<boolean name=\"raw\" value=\"true\"/>"}) {
+    const Vec3 n = leaning(scaled("<texture type=\"bitmap\">" + file + says + "</texture>"));
+    INFO(n.transpose());
+    CHECK((n - Vec3::UnitZ()).norm() < 1e-2f);
+  }
+  const Vec3 n =
+      leaning(scaled("<ref id=\"T\"/>"),
+              "<shape type=\"disk\"><bsdf type=\"diffuse\"><ref name=\"reflectance\" id=\"T\"/></bsdf></shape>"
+              "<texture type=\"bitmap\" id=\"T\">" +
+                  file + "</texture>");
+  CHECK((n - Vec3::UnitZ()).norm() < 1e-2f);
+  const Scene both = readScene(folder.path() / "test.xml");
+  CHECK(albedoAt(both.materials.at(1).bsdf) == Approx(0.604f).epsilon(1e-2));
+}
+
+TEST_CASE("scenes: a mask inside twosided is told to go outside") {
+  const std::string masked = "<bsdf type=\"mask\">" + diffuse("0.5") + "</bsdf>";
+  CHECK(faultOf("<bsdf type=\"twosided\">" + masked + "</bsdf>").find("mask > twosided") != std::string::npos);
+  CHECK(faultOf("<bsdf type=\"mask\"><bsdf type=\"twosided\">" + diffuse("0.5") + "</bsdf></bsdf>") == "");
+}
+
+}  // namespace lobe
