@@ -15,10 +15,13 @@ BsdfPtr makeMask(const Parameters& parameters);
 BsdfPtr makeMixture(const Parameters& parameters);
 BsdfPtr makeNormalMap(const Parameters& parameters);
 BsdfPtr makeNull(const Parameters& parameters);
+BsdfPtr makePhong(const Parameters& parameters);
 BsdfPtr makePlastic(const Parameters& parameters);
 BsdfPtr makeRoughConductor(const Parameters& parameters);
+BsdfPtr makeRoughDiffuse(const Parameters& parameters);
 BsdfPtr makeRoughPlastic(const Parameters& parameters);
 BsdfPtr makeThinDielectric(const Parameters& parameters);
 BsdfPtr makeTwoSided(const Parameters& parameters);
+BsdfPtr makeWard(const Parameters& parameters);
 
 }  // namespace lobe

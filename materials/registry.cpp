@@ -26,11 +26,14 @@ constexpr std::array kModels = {
     Entry{"mixturebsdf", makeMixture},
     Entry{"normalmap", makeNormalMap},
     Entry{"null", makeNull},
+    Entry{"phong", makePhong},
     Entry{"plastic", makePlastic},
     Entry{"roughconductor", makeRoughConductor},
+    Entry{"roughdiffuse", makeRoughDiffuse},
     Entry{"roughplastic", makeRoughPlastic},
     Entry{"thindielectric", makeThinDielectric},
     Entry{"twosided", makeTwoSided},
+    Entry{"ward", makeWard},
 };
 
 }  // namespace

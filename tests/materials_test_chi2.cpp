@@ -132,6 +132,12 @@ TEST_CASE("materials: every model samples its density") {
       {"blendbsdf", bsdfOf("blendbsdf", {{"weight", 0.3}}, {bsdfOf("twosided", {}, {shiny, plastic}), plastic})},
       {"mixturebsdf", bsdfOf("mixturebsdf", {{"weights", std::string("0.2 0.3 0.4")}},
                              {metal, bsdfOf("difftrans"), bsdfOf("dielectric")})},
+      {"roughdiffuse", bsdfOf("roughdiffuse", {{"alpha", 0.7}})},
+      {"dull phong", bsdfOf("phong", {{"exponent", 3.0}})},
+      {"shiny phong", bsdfOf("phong", {{"exponent", 3000.0}, {"diffuse_reflectance", 0.05}})},
+      {"ward", bsdfOf("ward", {{"alpha_u", 0.3}, {"variant", std::string("ward")}})},
+      {"ward-duer", bsdfOf("ward", {{"alpha_v", 0.5}, {"variant", std::string("ward-duer")}})},
+      {"balanced ward", bsdfOf("ward", {{"alpha_u", 0.02}, {"alpha_v", 0.3}})},
       {"bumpmap", bsdfOf("bumpmap", {{"map", constantTexture(grey(1.0f))}}, {metal})},
   };
   std::uint64_t seed = 300;

@@ -39,6 +39,19 @@ std::vector<Named> smoothModels() {
   const BsdfPtr back = models[4].bsdf;
   models.push_back({"twosided", bsdfOf("twosided", {}, {front, back})});
   models.push_back({"mask", bsdfOf("mask", {{"opacity", Rgb(0.3f, 0.6f, 0.9f)}}, {models.back().bsdf})});
+  for (const double exponent : {0.0, 5.0, 200.0, 20000.0})
+    models.push_back(
+        {"phong " + std::to_string(exponent),
+         bsdfOf("phong", {{"exponent", exponent}, {"specular_reflectance", 0.6}, {"diffuse_reflectance", 0.4}})});
+  for (const double alpha : {0.003, 0.1, 0.5})
+    models.push_back({"balanced ward " + std::to_string(alpha), bsdfOf("ward", {{"alpha_u", alpha},
+                                                                                {"alpha_v", 2.0 * alpha},
+                                                                                {"specular_reflectance", 0.6},
+                                                                                {"diffuse_reflectance", 0.4}})});
+  for (const bool fast : {false, true})
+    for (const double alpha : {0.1, 0.5, 1.0})
+      models.push_back({"roughdiffuse " + std::to_string(alpha) + (fast ? " fast" : ""),
+                        bsdfOf("roughdiffuse", {{"alpha", alpha}, {"reflectance", 0.9}, {"use_fast_approx", fast}})});
   models.push_back({"blendbsdf", bsdfOf("blendbsdf", {{"weight", 0.4}}, {models[1].bsdf, back})});
   models.push_back({"mixturebsdf", bsdfOf("mixturebsdf", {{"weights", std::string("0.5 0.2 0.3")}},
                                           {front, models[0].bsdf, models[1].bsdf})});

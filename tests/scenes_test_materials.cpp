@@ -106,4 +106,25 @@ TEST_CASE("scenes: a mask inside twosided is told to go outside") {
   CHECK(faultOf("<bsdf type=\"mask\"><bsdf type=\"twosided\">" + diffuse("0.5") + "</bsdf></bsdf>") == "");
 }
 
+TEST_CASE("scenes: phong, ward and roughdiffuse as Mitsuba 0.6 spells them") {
+  const std::string checkerboard = "<texture type=\"checkerboard\" name=";
+  const BsdfPtr phong = bsdfOf("<bsdf type=\"phong\"><float name=\"exponent\" value=\"50\"/>" + checkerboard +
+                               "\"diffuseReflectance\"/><spectrum name=\"specularReflectance\" value=\"0.3\"/></bsdf>");
+  CHECK(phong->mixture(kUp, Vec2(0.25f, 0.25f)).constant == Approx(0.4f));
+  CHECK(phong->mixture(kUp, Vec2(0.75f, 0.25f)).constant == Approx(0.2f));
+  CHECK(phong->mixture(kUp, Vec2::Zero()).glossy[0].tint == Approx(0.3f));
+  CHECK(phong->lobes()[0]->summary() == "phong, exponent 50");
+  const BsdfPtr ward = bsdfOf("<bsdf type=\"ward\"><string name=\"variant\" value=\"ward-duer\"/>" +
+                              number("alphaU", "0.1") + number("alphaV", "0.3") + "</bsdf>");
+  CHECK(ward->lobes()[0]->summary() == "ward-duer α 0.1×0.3");
+  const BsdfPtr rough =
+      bsdfOf("<bsdf type=\"roughdiffuse\">" + checkerboard + "\"alpha\"/>" + number("reflectance", "0.6") +
+             "<boolean name=\"useFastApprox\" value=\"true\"/></bsdf>");
+  CHECK(albedoAt(rough, Vec2(0.25f, 0.25f)) < albedoAt(rough, Vec2(0.75f, 0.25f)));
+  const std::string fault = faultOf("<bsdf type=\"phong\">\n" + number("alpha", "0.1") + "</bsdf>");
+  INFO(fault);
+  CHECK(fault.starts_with("test.xml:3:1: "));
+  CHECK(fault.find("diffuse_reflectance, exponent, specular_reflectance") != std::string::npos);
+}
+
 }  // namespace lobe
