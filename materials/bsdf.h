@@ -24,12 +24,15 @@ struct BsdfSample {
   Vec3 wi;
   Rgb f;      ///< BSDF value without the cosine
   float pdf;  ///< over solid angle, of the smooth part's sampler, > 0
+  /// Relative index of refraction crossed (1 for reflection): far side over the side of wo. f holds radiance, which
+  /// refraction scales by 1/eta²; flux, as of photons, keeps f·eta².
+  float eta = 1.0f;
 };
 
 struct DeltaSample {
   Vec3 wi;
   Rgb weight;  ///< f·|cosθ| over the probability of the choice made inside the delta part
-  float eta;   ///< relative index of refraction crossed (1 for reflection and pass-through): inside over outside of wo
+  float eta;   ///< relative index crossed (1 for reflection and pass-through), as BsdfSample::eta
 };
 
 /// How a smooth lobe enters a BSDF: ρ_bsdf ≈ Σ tint_i ρ_i + constant/π, luminances, for wo above the surface.

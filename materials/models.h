@@ -18,6 +18,7 @@ BsdfPtr makeNull(const Parameters& parameters);
 BsdfPtr makePhong(const Parameters& parameters);
 BsdfPtr makePlastic(const Parameters& parameters);
 BsdfPtr makeRoughConductor(const Parameters& parameters);
+BsdfPtr makeRoughDielectric(const Parameters& parameters);
 BsdfPtr makeRoughDiffuse(const Parameters& parameters);
 BsdfPtr makeRoughPlastic(const Parameters& parameters);
 BsdfPtr makeThinDielectric(const Parameters& parameters);

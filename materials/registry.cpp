@@ -29,6 +29,7 @@ constexpr std::array kModels = {
     Entry{"phong", makePhong},
     Entry{"plastic", makePlastic},
     Entry{"roughconductor", makeRoughConductor},
+    Entry{"roughdielectric", makeRoughDielectric},
     Entry{"roughdiffuse", makeRoughDiffuse},
     Entry{"roughplastic", makeRoughPlastic},
     Entry{"thindielectric", makeThinDielectric},

@@ -2,31 +2,15 @@
 
 #include <array>
 
-#include <fmt/format.h>
-
+#include "materials/dielectric_lobe.h"
 #include "materials/diffuse_base.h"
-#include "materials/fresnel.h"
 #include "materials/ior.h"
-#include "materials/microfacet_lobe.h"
 #include "materials/models.h"
 #include "materials/rough_transmittance.h"
 #include "materials/sampling.h"
 
 namespace lobe {
 namespace {
-
-class DielectricLobe final : public MicrofacetLobe {
- public:
-  DielectricLobe(const Microfacet& microfacet, double eta) : MicrofacetLobe(microfacet), eta_(eta) {}
-
- private:
-  std::string interfaceName() const override { return "dielectric"; }
-  std::string interfaceKey() const override { return fmt::format("eta={:a}", eta_); }
-  std::string interfaceSummary() const override { return fmt::format("dielectric {:.4g}", eta_); }
-  double reflectance(double cosHalf) const override { return fresnelDielectric(cosHalf, eta_).reflectance; }
-
-  double eta_;
-};
 
 class RoughPlastic final : public Bsdf {
  public:

@@ -55,18 +55,18 @@ struct Scattered {
 
 template <class SampleSmooth>
 std::optional<Scattered> scatter(const SurfaceHit& hit, Rng& rng, bool importance, const SampleSmooth& sampleSmooth) {
+  // Refraction scales radiance, not flux.
+  const auto fluxScale = [&](float eta) { return importance ? eta * eta : 1.0f; };
   const float delta = hit.bsdf->deltaProbability(hit.wo, hit.uv);
   if (delta > 0 && rng.uniform() < delta) {
     const std::optional<DeltaSample> sample = hit.bsdf->sampleDelta(hit.wo, hit.uv, rng.uniform());
     if (!sample) return std::nullopt;
-    // Refraction scales radiance, not flux.
-    const float scale = importance ? sample->eta * sample->eta : 1.0f;
-    return Scattered{sample->wi, sample->weight * (scale / delta), 0};
+    return Scattered{sample->wi, sample->weight * (fluxScale(sample->eta) / delta), 0};
   }
   const std::optional<BsdfSample> sample = sampleSmooth();
   if (!sample) return std::nullopt;
   const float pdf = (1 - delta) * sample->pdf;
-  return Scattered{sample->wi, sample->f * (std::abs(sample->wi.z()) / pdf), pdf};
+  return Scattered{sample->wi, sample->f * (fluxScale(sample->eta) * std::abs(sample->wi.z()) / pdf), pdf};
 }
 
 bool leave(const SurfaceHit& hit, const Scattered& scattered, Flight& flight, Rng& rng) {

@@ -130,6 +130,7 @@ class PathLoop {
     if (!sample) return false;
     const float pdf = share * sample->pdf;
     path.pdf = pdf;
+    path.eta2 *= sample->eta * sample->eta;
     return continueAlong(path, hit, sample->wi, sample->f * (std::abs(sample->wi.z()) / pdf));
   }
 

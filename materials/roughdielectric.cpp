@@ -1,0 +1,142 @@
+// A rough interface between two dielectrics: reflects and refracts.
+
+#include <array>
+#include <cmath>
+
+#include "materials/dielectric_lobe.h"
+#include "materials/ior.h"
+#include "materials/models.h"
+#include "materials/rough_interface.h"
+#include "materials/rough_transmittance.h"
+
+namespace lobe {
+namespace {
+
+using Vec3d = Eigen::Vector3d;
+
+class RoughDielectric final : public Bsdf {
+ public:
+  RoughDielectric(const Microfacet& microfacet, double eta, TexturePtr reflectance, TexturePtr transmittance)
+      : microfacet_(microfacet),
+        sides_{Side(microfacet, eta), Side(microfacet, 1.0 / eta)},
+        lobes_{std::make_shared<DielectricLobe>(microfacet, eta),
+               std::make_shared<DielectricLobe>(microfacet, 1.0 / eta)},
+        reflectance_(std::move(reflectance)),
+        transmittance_(std::move(transmittance)) {}
+
+  Rgb eval(const Vec3& wo, const Vec3& wi, const Vec2& uv) const override {
+    const FacetScattering s = scattering(wo, wi);
+    return s.value > 0.0 ? value(s, sharesAt(wo, s.cosHalf, uv)) : Rgb::Zero();
+  }
+
+  std::optional<BsdfSample> sample(const Vec3& wo, const Vec2& uv, float choice, const Vec2& u) const override {
+    if (wo.z() == 0.0f) return std::nullopt;
+    const double eta = sideOf(wo).eta;
+    const Vec3d o = upright(wo, wo).cast<double>().normalized();
+    const Vec3d m = microfacet_.sampleVisible(o, u);
+    const double c = o.dot(m);
+    const bool reflects = choice < sharesAt(wo, c, uv).probability(true);
+    const Vec3d i =
+        reflects ? Vec3d(2.0 * c * m - o) : Vec3d((c / eta - fresnelDielectric(c, eta).cosTransmitted) * m - o / eta);
+    const Vec3 wi = upright(i.normalized().cast<float>(), wo);
+    const FacetScattering s = scattering(wo, wi);
+    if (s.reflects != reflects) return std::nullopt;
+    const Shares shares = sharesAt(wo, s.cosHalf, uv);
+    const float drawn = density(s, shares);
+    if (!(drawn > 0.0f)) return std::nullopt;
+    return BsdfSample{wi, value(s, shares), drawn, reflects ? 1.0f : static_cast<float>(eta)};
+  }
+
+  float pdf(const Vec3& wo, const Vec3& wi, const Vec2& uv) const override {
+    const FacetScattering s = scattering(wo, wi);
+    return s.density > 0.0 ? density(s, sharesAt(wo, s.cosHalf, uv)) : 0.0f;
+  }
+
+  std::span<const LobePtr> lobes() const override { return lobes_; }
+
+  LobeMixture mixture(const Vec3& wo, const Vec2& uv) const override {
+    LobeMixture result;
+    if (wo.z() == 0.0f) return result;
+    result.glossy[0] = {wo.z() > 0.0f ? 0 : 1, luminance(reflectance_->eval(uv))};
+    result.glossyCount = 1;
+    result.transmittedShare = meanShares(wo, uv).probability(false);
+    return result;
+  }
+
+  /// Of energy: without the scaling of radiance by the squared index. What is lost between facets counts as reflected.
+  Rgb albedo(const Vec3& wo, const Vec2& uv) const override {
+    const Shares mean = meanShares(wo, uv);
+    return mean.reflected + mean.refracted;
+  }
+
+  bool transmits() const override { return true; }
+
+ private:
+  /// The interface as seen from one side.
+  struct Side {
+    Side(const Microfacet& microfacet, double relative)
+        : eta(relative), transmittance(isotropic(microfacet), relative) {}
+
+    static Microfacet isotropic(const Microfacet& m) {
+      const double alpha = std::sqrt(m.alphaU() * m.alphaV());
+      return {m.kind(), alpha, alpha};
+    }
+
+    double eta;  ///< index of the far side over that of this one
+    RoughTransmittance transmittance;
+  };
+
+  /// What the interface does with light that meets a facet.
+  struct Shares {
+    Rgb reflected, refracted;
+    /// How often the sampler takes one of them: by luminance; 0 where nothing comes of either.
+    float probability(bool reflects) const {
+      const float total = luminance(reflected) + luminance(refracted);
+      return total > 0.0f ? luminance(reflects ? reflected : refracted) / total : 0.0f;
+    }
+  };
+
+  const Side& sideOf(const Vec3& wo) const { return sides_[wo.z() > 0.0f ? 0 : 1]; }
+  /// w in the frame in which wo is above the surface; and back.
+  static Vec3 upright(const Vec3& w, const Vec3& wo) { return wo.z() > 0.0f ? w : Vec3(w.x(), w.y(), -w.z()); }
+
+  FacetScattering scattering(const Vec3& wo, const Vec3& wi) const {
+    return scatterAtFacets(microfacet_, sideOf(wo).eta, upright(wo, wo), upright(wi, wo));
+  }
+  static Rgb value(const FacetScattering& s, const Shares& shares) {
+    return static_cast<float>(s.value) * (s.reflects ? shares.reflected : shares.refracted);
+  }
+  static float density(const FacetScattering& s, const Shares& shares) {
+    return static_cast<float>(s.density) * shares.probability(s.reflects);
+  }
+
+  Shares shares(double reflectance, const Vec2& uv) const {
+    const float r = static_cast<float>(reflectance);
+    return {r * reflectance_->eval(uv), (1.0f - r) * transmittance_->eval(uv)};
+  }
+  Shares sharesAt(const Vec3& wo, double cosHalf, const Vec2& uv) const {
+    return shares(fresnelDielectric(cosHalf, sideOf(wo).eta).reflectance, uv);
+  }
+  Shares meanShares(const Vec3& wo, const Vec2& uv) const {
+    return shares(1.0f - sideOf(wo).transmittance(std::abs(wo.z())), uv);
+  }
+
+  Microfacet microfacet_;
+  std::array<Side, 2> sides_;  ///< from outside, from inside
+  std::array<LobePtr, 2> lobes_;
+  TexturePtr reflectance_;
+  TexturePtr transmittance_;
+};
+
+}  // namespace
+
+BsdfPtr makeRoughDielectric(const Parameters& parameters) {
+  const double eta = readRelativeIor(parameters, "bk7");
+  // Without a difference every normal lets light straight through: there is no half vector.
+  if (std::abs(eta - 1.0) < 1e-6) throw ParameterError("int_ior", "int_ior and ext_ior must differ");
+  return std::make_shared<RoughDielectric>(Microfacet::read(parameters), eta,
+                                           parameters.texture("specular_reflectance", grey(1.0f)),
+                                           parameters.texture("specular_transmittance", grey(1.0f)));
+}
+
+}  // namespace lobe
