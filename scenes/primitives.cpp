@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 
+#include "materials/frame.h"
 #include "scenes/world_mesh.h"
 
 namespace lobe {
@@ -23,6 +24,15 @@ void addSquare(TriangleMesh& mesh, const Vec3& centre, const Vec3& s, const Vec3
   }
   mesh.triangles.push_back({first, first + 1, first + 2});
   mesh.triangles.push_back({first, first + 2, first + 3});
+}
+
+bool isCircle(const Vec3& u, const Vec3& v) {
+  const float square = u.squaredNorm();
+  return std::abs(v.squaredNorm() - square) <= 2 * kTolerance * square && std::abs(u.dot(v)) <= kTolerance * square;
+}
+
+bool mirrors(const Eigen::Matrix3f& linear) {
+  return linear.cast<double>().determinant() < 0;
 }
 
 /// The faces are flat, so their own normals serve faceNormals, too, and keep the front under mirroring.
@@ -52,11 +62,8 @@ TriangleMesh makeCube(const MeshOptions& options) {
 Disk makeDisk(const MeshOptions& options) {
   const Eigen::Matrix3f linear = checkedLinear(options.toWorld);
   const Vec3 u = linear.col(0), v = linear.col(1);
-  const float square = u.squaredNorm();
-  if (!(std::abs(v.squaredNorm() - square) <= 2 * kTolerance * square && std::abs(u.dot(v)) <= kTolerance * square))
-    throw std::runtime_error("a disk's transform must keep it round");
-  const bool turned = (linear.cast<double>().determinant() < 0) != options.flipNormals;
-  return {options.toWorld.topRightCorner<3, 1>(), u, turned ? Vec3(-v) : v};
+  if (!isCircle(u, v)) throw std::runtime_error("a disk's transform must keep it round");
+  return {options.toWorld.topRightCorner<3, 1>(), u, v, mirrors(linear) != options.flipNormals};
 }
 
 Sphere makeSphere(const Vec3& centre, float radius, const MeshOptions& options) {
@@ -67,7 +74,24 @@ Sphere makeSphere(const Vec3& centre, float radius, const MeshOptions& options) 
   const float square = squares.trace() / 3;
   if (!((squares - square * Eigen::Matrix3f::Identity()).cwiseAbs().maxCoeff() <= 2 * kTolerance * square))
     throw std::runtime_error("a sphere's transform must scale all directions alike");
-  return {linear * centre + options.toWorld.topRightCorner<3, 1>(), radius * std::sqrt(square), options.flipNormals};
+  const float scale = std::sqrt(square);
+  return {linear * centre + options.toWorld.topRightCorner<3, 1>(), radius * scale, options.flipNormals,
+          linear / scale};
+}
+
+Cylinder makeCylinder(const Vec3& start, const Vec3& end, float radius, const MeshOptions& options) {
+  const Vec3 along = end - start;
+  if (!(radius > 0) || !std::isfinite(radius) || !start.allFinite() || !end.allFinite() || along.isZero(0))
+    throw std::runtime_error("a cylinder needs two different finite ends and a radius above zero");
+  const Frame frame = Frame::fromNormal(along.normalized());
+  const Eigen::Matrix3f linear = checkedLinear(options.toWorld);
+  const Vec3 u = linear * (radius * frame.s), v = linear * (radius * frame.t), axis = linear * along;
+  const auto upright = [&](const Vec3& edge) {
+    return std::abs(edge.dot(axis)) <= kTolerance * edge.norm() * axis.norm();
+  };
+  if (!isCircle(u, v) || !upright(u) || !upright(v))
+    throw std::runtime_error("a cylinder's transform must keep it round and upright");
+  return {linear * start + options.toWorld.topRightCorner<3, 1>(), u, v, axis, options.flipNormals};
 }
 
 }  // namespace lobe

@@ -16,8 +16,11 @@ TriangleMesh makeCube(const MeshOptions& options);
 /// The unit disk in the plane z = 0, front towards +z. std::runtime_error: the transform makes an ellipse of it.
 Disk makeDisk(const MeshOptions& options);
 
-/// radius > 0. std::runtime_error: the transform makes an ellipsoid of it. The transform's rotation is lost: texture
-/// coordinates follow the world's axes.
+/// radius > 0. std::runtime_error: the transform makes an ellipsoid of it.
 Sphere makeSphere(const Vec3& centre, float radius, const MeshOptions& options);
+
+/// The side of a cylinder about the segment from start to end; radius > 0. As Mitsuba's, its texture starts at an
+/// azimuth of no meaning. std::runtime_error: the transform does not keep it a right circular cylinder.
+Cylinder makeCylinder(const Vec3& start, const Vec3& end, float radius, const MeshOptions& options);
 
 }  // namespace lobe

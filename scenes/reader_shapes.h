@@ -1,7 +1,10 @@
 #pragma once
 // Shape elements of scene files.
 
+#include <map>
+
 #include "scenes/mesh_options.h"
+#include "scenes/mesh_source.h"
 #include "scenes/reader_materials.h"
 
 namespace lobe {
@@ -21,25 +24,39 @@ class ShapeReader {
     pugi::xml_node bsdf;
     std::optional<AreaEmitter> emitter;
   };
+  /// Where a shape is kept: at the top of the scene (group −1) or in a group.
+  struct Place {
+    int group;
+    std::size_t index;
+  };
   struct Mesh {
-    std::size_t shape;  // index into Scene::shapes
+    Place shape;
     std::ptrdiff_t location;
-    std::string type;
-    std::filesystem::path path;
+    MeshSource source;
     MeshOptions options;
     std::string fault;
   };
 
+  void addTo(int group, pugi::xml_node node);
+  void addShape(int group, pugi::xml_node node, const std::string& type);
+  void addInstance(pugi::xml_node node);
+  int groupOf(pugi::xml_node node);
+  void readGroup(pugi::xml_node node, int group);
   bool take(pugi::xml_node child, Parts& parts);
   void takeEmitter(pugi::xml_node node, Parts& parts);
-  Shape make(pugi::xml_node node, const std::string& type, const Parameters& parameters);
-  void addMesh(const std::string& type, const Parameters& parameters, const MeshOptions& options, Shape& shape);
+  Shape make(int group, pugi::xml_node node, const std::string& type, const Parameters& parameters);
+  void addMesh(int group, const std::string& type, const Parameters& parameters, const MeshOptions& options,
+               Shape& shape);
+  std::vector<Shape>& shapesOf(int group) {
+    return group < 0 ? context_.scene.shapes : context_.scene.groups[static_cast<std::size_t>(group)].shapes;
+  }
   void reportFaults();
 
   ReadContext& context_;
   TextureReader& textures_;
   MaterialReader& materials_;
   std::vector<Mesh> meshes_;
+  std::map<std::ptrdiff_t, int> groups_;  // by place in the file
 };
 
 }  // namespace lobe

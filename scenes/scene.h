@@ -31,16 +31,35 @@ struct Sphere {
   Vec3 centre;
   float radius;
   bool flipped = false;
+  /// Orthogonal: turns the sphere's own axes, which its texture coordinates follow, into the world.
+  Eigen::Matrix3f axes = Eigen::Matrix3f::Identity();
 };
 
-/// A flat disk spanned by two orthogonal edge vectors of equal length from the centre; u × v is the front's direction.
-/// uv: (radius, azimuth/2π) as Mitsuba has it.
+/// A flat disk spanned by two orthogonal edge vectors of equal length from the centre; u × v is the front's direction
+/// unless flipped. uv: (radius, azimuth/2π) as Mitsuba has it.
 struct Disk {
   Vec3 centre;
   Vec3 u, v;
+  bool flipped = false;
 };
 
-using Geometry = std::variant<TriangleMesh, Sphere, Disk>;
+/// The side of a right circular cylinder, open at both ends: base + cosφ u + sinφ v + h axis with h in [0,1], where u
+/// and v are orthogonal to each other and to the axis, and as long as the radius. The outside is the front unless
+/// flipped. uv: (φ/2π, h).
+struct Cylinder {
+  Vec3 base;
+  Vec3 u, v;
+  Vec3 axis;
+  bool flipped = false;
+};
+
+/// All shapes of a group, once more, somewhere else.
+struct Instance {
+  int group;                ///< index into Scene::groups
+  Eigen::Affine3f toWorld;  ///< from the group's space; invertible
+};
+
+using Geometry = std::variant<TriangleMesh, Sphere, Disk, Cylinder, Instance>;
 
 struct AreaEmitter {
   TexturePtr radiance;  ///< emitted on the front side only
@@ -49,8 +68,13 @@ struct AreaEmitter {
 struct Shape {
   std::string name;  ///< for messages: the file's id, or the mesh's file name
   Geometry geometry;
-  int material = -1;  ///< index into Scene::materials
+  int material = -1;  ///< index into Scene::materials; −1 for instances, whose shapes have their own
   std::optional<AreaEmitter> emitter;
+};
+
+/// Shapes that are shown by instances only, in a space of their own. None is an instance, and none emits.
+struct ShapeGroup {
+  std::vector<Shape> shapes;
 };
 
 struct Material {
@@ -86,6 +110,7 @@ struct PixelFilter {
 
 struct Scene {
   std::vector<Shape> shapes;
+  std::vector<ShapeGroup> groups;
   std::vector<Material> materials;
   std::optional<Environment> environment;
   Camera camera;

@@ -655,12 +655,14 @@ TEST_CASE("scenes: disk") {
   requireNear(disk.centre, Vec3(1, 2, 3));
   REQUIRE(disk.u.norm() == Approx(2));
   requireNear(Vec3(disk.u.cross(disk.v) / 4), Vec3(transform.linear().col(2) / 5));
+  REQUIRE_FALSE(disk.flipped);
+  // Mirrored, texture and front stay where they are: the edges swap hands.
   const Disk mirrored = makeDisk(placed(mirror()));
-  requireNear(mirrored.u.cross(mirrored.v), Vec3::UnitZ());
+  requireNear(mirrored.u.cross(mirrored.v), -Vec3::UnitZ());
+  REQUIRE(mirrored.flipped);
   MeshOptions flipped;
   flipped.flipNormals = true;
-  const Disk back = makeDisk(flipped);
-  requireNear(back.u.cross(back.v), -Vec3::UnitZ());
+  REQUIRE(makeDisk(flipped).flipped);
   REQUIRE_THROWS_AS(makeDisk(placed(Eigen::Affine3f(Eigen::Scaling(1.0f, 2.0f, 1.0f)))), std::runtime_error);
 }
 
@@ -671,12 +673,29 @@ TEST_CASE("scenes: sphere") {
   requireNear(sphere.centre, Vec3(1, -1, 3));
   REQUIRE(sphere.radius == Approx(1.5f));
   REQUIRE_FALSE(sphere.flipped);
+  requireNear(sphere.axes.col(1), Vec3(0, -1, 0));
+  REQUIRE((sphere.axes.transpose() * sphere.axes).isIdentity(1e-5f));
   MeshOptions flipped;
   flipped.flipNormals = true;
   REQUIRE(makeSphere(Vec3::Zero(), 1, flipped).flipped);
   REQUIRE_THROWS_AS(makeSphere(Vec3::Zero(), 0, {}), std::runtime_error);
   REQUIRE_THROWS_AS(makeSphere(Vec3::Zero(), 1, placed(Eigen::Affine3f(Eigen::Scaling(1.0f, 1.0f, 1.01f)))),
                     std::runtime_error);
+}
+
+TEST_CASE("scenes: cylinder") {
+  const Eigen::Affine3f transform =
+      Eigen::Translation3f(1, 2, 3) * Eigen::AngleAxisf(1.5707964f, Vec3::UnitX()) * Eigen::Scaling(2.0f, 2.0f, 5.0f);
+  const Cylinder cylinder = makeCylinder({0, 0, 1}, {0, 0, 2}, 0.5f, placed(transform));
+  requireNear(cylinder.base, Vec3(1, -3, 3));
+  requireNear(cylinder.axis, Vec3(0, -5, 0));
+  REQUIRE(cylinder.u.norm() == Approx(1));
+  REQUIRE(cylinder.v.norm() == Approx(1));
+  REQUIRE(cylinder.u.dot(cylinder.v) == Approx(0).margin(1e-6));
+  const auto scaled = [](float x, float y, float z) { return placed(Eigen::Affine3f(Eigen::Scaling(x, y, z))); };
+  REQUIRE_THROWS_WITH(makeCylinder({0, 0, 0}, {0, 0, 1}, 1, scaled(1, 2, 1)), Contains("round"));
+  REQUIRE_THROWS_WITH(makeCylinder({0, 0, 0}, {1, 0, 1}, 1, scaled(1, 1, 2)), Contains("round"));
+  REQUIRE_THROWS_WITH(makeCylinder({0, 0, 1}, {0, 0, 1}, 1, {}), Contains("two different"));
 }
 
 TEST_CASE("scenes: transforms that flatten, project or are not numbers are refused") {
@@ -691,5 +710,6 @@ TEST_CASE("scenes: transforms that flatten, project or are not numbers are refus
     REQUIRE_THROWS_WITH(makeCube(options), Contains("transform"));
     REQUIRE_THROWS_WITH(makeDisk(options), Contains("transform"));
     REQUIRE_THROWS_WITH(makeSphere(Vec3::Zero(), 1, options), Contains("transform"));
+    REQUIRE_THROWS_WITH(makeCylinder(Vec3::Zero(), Vec3::UnitX(), 1, options), Contains("transform"));
   }
 }

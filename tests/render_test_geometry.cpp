@@ -29,9 +29,7 @@ SurfaceHit hitOf(const Scene& scene, const Ray& ray) {
 struct Leaks {
   int self = 0, through = 0;
 };
-Leaks leaksOf(const Geometry& geometry, const Vec3& centre, float size) {
-  Scene scene;
-  addShape(scene, geometry, -1);
+Leaks leaksOf(const Scene& scene, const Vec3& centre, float size) {
   const RayTracer tracer(scene);
   Leaks leaks;
   Rng rng(3);
@@ -59,8 +57,10 @@ TEST_CASE("render: rays leave surfaces at any scale") {
   const float away = GENERATE(0.0f, 30.0f);  // of the coordinates' origin, in units of size
   const Vec3 centre = size * away * Vec3(0.3f, -0.8f, 0.52f);
   CAPTURE(size, away);
+  Scene scene;
   const auto check = [&](const Geometry& geometry) {
-    const Leaks leaks = leaksOf(geometry, centre, size);
+    addShape(scene, geometry, -1);
+    const Leaks leaks = leaksOf(scene, centre, size);
     CHECK(leaks.self == 0);
     CHECK(leaks.through == 0);
   };
@@ -72,6 +72,18 @@ TEST_CASE("render: rays leave surfaces at any scale") {
   }
   SECTION("mesh") {
     check(sphereMesh(centre, size, 12));
+  }
+  SECTION("cylinder with lids") {
+    addShape(scene, Disk{centre + Vec3(0, 0, size), {size, 0, 0}, {0, size, 0}}, -1);
+    addShape(scene, Disk{centre - Vec3(0, 0, size), {0, size, 0}, {size, 0, 0}}, -1);
+    check(Cylinder{centre - Vec3(0, 0, size), {size, 0, 0}, {0, size, 0}, {0, 0, 2 * size}});
+  }
+  SECTION("instance of a mesh far from its own origin") {
+    scene.groups.resize(1);
+    scene.groups[0].shapes.push_back({"", sphereMesh({3, 5, -2}, 0.01f, 12), -1, std::nullopt});
+    Eigen::Affine3f toWorld(Eigen::Translation3f(centre) * Eigen::AngleAxisf(0.8f, Vec3(2, 1, 2) / 3) *
+                            Eigen::Scaling(100 * size) * Eigen::Translation3f(-3, -5, 2));
+    check(Instance{0, toWorld});
   }
 }
 
@@ -148,6 +160,90 @@ TEST_CASE("render: a hit tells position, sides, coordinates and frame") {
     CHECK((hit.uv - Vec2(0.5f, 0.25f)).norm() < 1e-6f);
     CHECK_FALSE(RayTracer(scene).trace({Vec3(1.5f, 3, 1.5f), Vec3(0, -1, 0)}));
   }
+}
+
+TEST_CASE("render: a cylinder is hit from outside, from inside and through its ends") {
+  Scene scene;
+  const int material = addMaterial(scene, std::make_shared<Diffuse>(0.5f));
+  const bool flipped = GENERATE(false, true);
+  const float side = flipped ? -1.0f : 1.0f;
+  addShape(scene, Cylinder{{1, 2, 3}, {0.5f, 0, 0}, {0, 0.5f, 0}, {0, 0, 4}, flipped}, material);
+  for (const float start : {5.0f, 1.0f}) {
+    const SurfaceHit hit = hitOf(scene, {Vec3(start, 2, 4), start > 1 ? Vec3(-1, 0, 0) : Vec3(1, 0, 0)});
+    CHECK((hit.position - Vec3(1.5f, 2, 4)).norm() < 1e-6f);
+    CHECK((hit.normal - Vec3(side, 0, 0)).norm() < 1e-6f);
+    CHECK((hit.frame.s - Vec3(0, 1, 0)).norm() < 1e-5f);
+    CHECK((hit.uv - Vec2(0, 0.25f)).norm() < 1e-6f);
+  }
+  const RayTracer tracer(scene);
+  CHECK_FALSE(tracer.trace({Vec3(1.2f, 2, 0), Vec3(0, 0, 1)}));   // along the axis
+  CHECK_FALSE(tracer.trace({Vec3(5, 2, 7.1f), Vec3(-1, 0, 0)}));  // past its end
+  // In by the open end, against the wall from within.
+  const SurfaceHit inside = hitOf(scene, {Vec3(1, 2, 2), Vec3(0.3f, 0, 1).normalized()});
+  CHECK((inside.position - Vec3(1.5f, 2, 2 + 0.5f / 0.3f)).norm() < 1e-5f);
+}
+
+TEST_CASE("render: a sphere's coordinates turn with its axes") {
+  Scene scene;
+  const Eigen::Matrix3f axes = Eigen::AngleAxisf(0.5f * kPi, Vec3::UnitX()).toRotationMatrix();
+  addShape(scene, Sphere{{0, 0, 0}, 1, false, axes}, addMaterial(scene, std::make_shared<Diffuse>(0.5f)));
+  // Its own z axis is the world's −y, its own y axis the world's z.
+  CHECK(hitOf(scene, {Vec3(0, -3, 0), Vec3(0, 1, 0)}).uv.y() == Approx(0).margin(1e-6));
+  const SurfaceHit hit = hitOf(scene, {Vec3(0, 0, 3), Vec3(0, 0, -1)});
+  CHECK((hit.uv - Vec2(0.25f, 0.5f)).norm() < 1e-6f);
+  CHECK((hit.frame.s - Vec3(-1, 0, 0)).norm() < 1e-5f);
+}
+
+namespace {
+
+/// The mesh where an instance shows it.
+TriangleMesh baked(TriangleMesh mesh, const Eigen::Affine3f& toWorld) {
+  for (Vec3& p : mesh.positions) p = toWorld * p;
+  // Not made unit, so that interpolation weighs them as it does in the group's space.
+  for (Vec3& n : mesh.normals) n = toWorld.linear().inverse().transpose() * n;
+  if (toWorld.linear().determinant() < 0)
+    for (auto& t : mesh.triangles) std::swap(t[1], t[2]);
+  return mesh;
+}
+
+}  // namespace
+
+TEST_CASE("render: an instance looks as the same mesh put there") {
+  Eigen::Affine3f toWorld(Eigen::Translation3f(1, -2, 0.5f) * Eigen::AngleAxisf(0.8f, Vec3(2, 1, 2) / 3) *
+                          Eigen::Scaling(2.0f, 0.5f, 1.0f));
+  if (GENERATE(false, true)) toWorld = toWorld * Eigen::Scaling(-1.0f, 1.0f, 1.0f);
+  const TriangleMesh ball = sphereMesh({0.1f, 0.2f, 0}, 0.6f, 7);
+  const TriangleMesh plate = rectangle({-2, -2, -1}, {4, 0, 0.3f}, {0, 4, 0});
+  Scene direct, instanced;
+  for (Scene* scene : {&direct, &instanced})
+    for (int i = 0; i < 2; ++i) addMaterial(*scene, std::make_shared<Diffuse>(0.5f));
+  addShape(direct, baked(ball, toWorld), 0);
+  addShape(direct, baked(plate, toWorld), 1);
+  instanced.groups.resize(2);
+  instanced.groups[1].shapes = {{"", ball, 0, std::nullopt}, {"", plate, 1, std::nullopt}};
+  addShape(instanced, Instance{1, toWorld}, -1);
+  const RayTracer a(direct), b(instanced);
+  CHECK((a.bounds().diagonal() - b.bounds().diagonal()).norm() < 2.0f);  // theirs is the box of a box
+  Rng rng(8);
+  int hits = 0, differing = 0;
+  for (int i = 0; i < 5000; ++i) {
+    const Vec3 from = 6 * randomDirection(rng);
+    const Ray ray{from, (Vec3(1, -2, 0.5f) + randomDirection(rng) - from).normalized()};
+    const auto x = a.trace(ray), y = b.trace(ray);
+    if (!x || !y || x->material != y->material) {
+      differing += x.has_value() != y.has_value();
+      continue;
+    }
+    ++hits;
+    const float error = (x->position - y->position).norm() + (x->normal - y->normal).norm() +
+                        (x->frame.n - y->frame.n).norm() + (x->frame.s - y->frame.s).norm() +
+                        std::abs(x->distance - y->distance) + (x->wo - y->wo).norm();
+    differing += error > 1e-3f || (x->material == 1 && (x->uv - y->uv).norm() > 1e-4f);
+    CHECK(y->shape == 0);
+    CHECK(y->bsdf == instanced.materials[y->material].bsdf.get());
+  }
+  CHECK(hits > 3000);
+  CHECK(differing < 20);  // rays that pass an edge by rounding
 }
 
 TEST_CASE("render: a spherical triangle mesh is closed to rays") {

@@ -45,6 +45,9 @@ std::vector<LightCase> lightCases() {
   addEmitter(add("sphere from outside", {0.5f, 0, 0}), Sphere{{2, 1, 1}, 0.9f}, 1);
   addEmitter(add("sphere from inside", {0.5f, 0.2f, 0}), Sphere{{0, 0, 0}, 1, true}, 1);
   addEmitter(add("disk", {0, 0, 0}), Disk{{0, 1, 1}, {1.5f, 0, 0}, {0, 0, 1.5f}}, 1);
+  addEmitter(add("cylinder from outside", {2, 0.5f, 0}), Cylinder{{0, 0, -1}, {0, 1, 0}, {-1, 0, 0}, {0, 0, 3}}, 1);
+  addEmitter(add("cylinder from inside", {0.5f, 0.2f, 0}), Cylinder{{0, 0, -1}, {0, 1, 0}, {-1, 0, 0}, {0, 0, 3}, true},
+             1);
   addEmitter(add("box from inside", {0.5f, 0.2f, 0}), box({-1, -1, -1}, {1, 2, 1}, true), 1);
   add("constant environment", {0, 0, 0}).environment = environment(Image(1, 1, grey(2)));
   add("environment", {0, 0, 0}).environment = turnedSky();

@@ -60,6 +60,10 @@ TEST_CASE("render: direct light has its closed form") {
     const double d2 = centre.squaredNorm();
     CHECK(deviationOfDirect(scene, kAlbedo * 3 * 1.44 / d2 * 3 / std::sqrt(d2)) < kMaxDeviation);
   }
+  SECTION("cylinder around") {
+    addEmitter(scene, Cylinder{{0, 0, 0}, {0, 0, 1.5f}, {1.5f, 0, 0}, {0, 2, 0}, true}, 3);
+    CHECK(deviationOfDirect(scene, kAlbedo * 3 * 4 / (2.25 + 4)) < kMaxDeviation);  // all but the open end
+  }
   SECTION("sphere, tiny and far") {
     const Vec3 centre(200, 300, 100);
     addEmitter(scene, Sphere{centre, 0.01f}, 1e8f);
@@ -91,6 +95,11 @@ TEST_CASE("render: a furnace shines as emission over one minus albedo") {
   SECTION("half mirror") {
     const int mirror = addMaterial(scene, std::make_shared<HalfMirror>(0.4f, 0.2f, 0.3f));
     addEmitter(scene, box({0, 1, 2}, {2, 3, 4}, true), emission, mirror);
+  }
+  SECTION("cylinder") {
+    addEmitter(scene, Cylinder{{1, 2, 2}, {1, 0, 0}, {0, 1, 0}, {0, 0, 2}, true}, emission, material);
+    addEmitter(scene, Disk{{1, 2, 2}, {1, 0, 0}, {0, 1, 0}}, emission, material);
+    addEmitter(scene, Disk{{1, 2, 4}, {1, 0, 0}, {0, 1, 0}, true}, emission, material);
   }
   const RenderScene ready(scene);
   const Ray ray{Vec3(1, 2, 3), Vec3(1, 2, -1.5f).normalized()};

@@ -171,7 +171,33 @@ TEST_CASE("scenes: shapes are put where their transform says") {
   CHECK(sphere.radius == Approx(4));
   CHECK(meshOf(scene, 2).triangles.size() == 12);
   const Disk& disk = std::get<Disk>(scene.shapes[3].geometry);
-  CHECK(disk.u.cross(disk.v).z() < 0);
+  CHECK(disk.flipped);
+}
+
+TEST_CASE("scenes: a cylinder has Mitsuba's defaults") {
+  const Scene scene = readBody("<shape type=\"cylinder\"><float name=\"radius\" value=\"2\"/></shape>");
+  const auto& cylinder = std::get<Cylinder>(scene.shapes.at(0).geometry);
+  checkNear(cylinder.base, {0, 0, 0});
+  checkNear(cylinder.axis, {0, 0, 1});
+  CHECK(cylinder.u.norm() == Approx(2));
+}
+
+TEST_CASE("scenes: groups are shown by instances, before and after they are defined") {
+  const std::string instance =
+      "<shape type=\"instance\"><ref id=\"trees\"/><transform name=\"toWorld\"><translate "
+      "x=\"5\"/></transform></shape>";
+  const std::string group =
+      "<shape type=\"shapegroup\" id=\"trees\"><shape type=\"cube\"/><shape type=\"sphere\"/></shape>";
+  const Scene scene = readBody(instance + group + instance + "<shape type=\"disk\"/>");
+  REQUIRE(scene.groups.size() == 1);
+  CHECK(scene.groups[0].shapes.size() == 2);
+  REQUIRE(scene.shapes.size() == 3);
+  for (const std::size_t i : {0, 1}) {
+    CHECK(std::get<Instance>(scene.shapes[i].geometry).group == 0);
+    CHECK(std::get<Instance>(scene.shapes[i].geometry).toWorld.translation().x() == 5);
+    CHECK(scene.shapes[i].material == -1);
+  }
+  CHECK(scene.groups[0].shapes[1].material == scene.shapes[2].material);
 }
 
 TEST_CASE("scenes: meshes are read from beside the scene, with blanks in their names") {

@@ -43,7 +43,8 @@ TEST_CASE("scenes: unknown elements and types are told with what is known") {
   checkFault(faultOf("<shape type=\"disk\">\n  <bsdf type=\"velvet\"/>\n</shape>"), "3:3",
              {"\"velvet\"", "roughplastic", "diffuse"});
   checkFault(faultOf("\n <bsdf type=\"velvet\" id=\"NotUsed\"/>"), "3:2", {"\"velvet\""});
-  checkFault(faultOf("<shape type=\"torus\"/>"), "2:1", {"\"torus\"", "cube, disk, obj, ply, rectangle, sphere"});
+  checkFault(faultOf("<shape type=\"torus\"/>"), "2:1",
+             {"\"torus\"", "cube, cylinder, disk, instance, obj, ply, rectangle, serialized, shapegroup, sphere"});
   checkFault(faultOf("<emitter type=\"spot\"/>"), "2:1", {"\"spot\"", "area, constant, envmap"});
   checkFault(faultOf("<emitter type=\"area\"/>"), "2:1", {"inside a shape"});
   checkFault(faultOf("<shape type=\"disk\"><emitter type=\"spot\"/></shape>"), "2:20", {"\"spot\"", "area"});
@@ -138,6 +139,24 @@ TEST_CASE("scenes: undefined names and references are told") {
              "3:22", {"$a", "defined are b"});
   checkFault(faultOf("<shape type=\"disk\">\n<ref id=\"Gold\"/></shape>"), "3:1", {"\"Gold\""});
   checkFault(faultOf("<bsdf type=\"diffuse\" id=\"A\"/>\n<bsdf type=\"diffuse\" id=\"A\"/>"), "3:1", {"\"A\"", ":2:1"});
+}
+
+TEST_CASE("scenes: groups and instances that make no sense are refused") {
+  const auto group = [](const std::string& inside) {
+    return "<shape type=\"shapegroup\" id=\"g\">" + inside + "</shape>";
+  };
+  CHECK_THAT(faultOf("<shape type=\"instance\"/>"), Catch::Contains("2:1") && Catch::Contains("<ref> to a shapegroup"));
+  CHECK_THAT(faultOf("<shape type=\"instance\"><shape type=\"cube\"/></shape>"), Catch::Contains("one shapegroup"));
+  CHECK_THAT(faultOf(group("<shape type=\"sphere\"><emitter type=\"area\"/></shape>")), Catch::Contains("cannot emit"));
+  CHECK_THAT(faultOf(group("<shape type=\"shapegroup\"/>")), Catch::Contains("plain shapes only"));
+  CHECK_THAT(faultOf(group("") + "<shape type=\"instance\"><ref id=\"g\"/><transform name=\"toWorld\"><scale x=\"0\"/>"
+                                 "</transform></shape>"),
+             Catch::Contains("singular"));
+}
+
+TEST_CASE("scenes: a cylinder without length is refused") {
+  CHECK_THAT(faultOf("<shape type=\"cylinder\">\n<point name=\"p1\" x=\"0\" y=\"0\" z=\"0\"/></shape>"),
+             Catch::Contains("3:1") && Catch::Contains("must differ"));
 }
 
 TEST_CASE("scenes: lenient reading replaces what it does not know and warns once per kind") {

@@ -43,7 +43,7 @@ std::vector<LobeRequest> lobeRequests(const Scene& scene) {
 }
 
 GuidedSampler::GuidedSampler(const Scene& scene, const IlluminationCache& illumination, const BrdfCaches* caches)
-    : scene_(scene), illumination_(illumination), caches_(caches) {
+    : illumination_(illumination), caches_(caches) {
   int next = 0;
   for (const Material& material : scene.materials) {
     firstRequest_.push_back(next);
@@ -73,7 +73,7 @@ void GuidedSampler::Vertex::collectReflectance(const GuidedSampler& sampler, con
   // as the mirrored (s, t, −n) of two-sided materials; for another lobe the density would be worse, not wrong.
   const Vec3 wo(hit.wo.x(), side * hit.wo.y(), side * hit.wo.z());
   const Vec2 turn(axes_(0, 0), axes_(1, 0));
-  const int first = sampler.firstRequest_[sampler.scene_.shapes[hit.shape].material];
+  const int first = sampler.firstRequest_[hit.material];
   for (int i = 0; i < mixture.glossyCount; ++i)
     if (mixture.glossy[i].tint > 0)
       sampler.caches_->add(first + mixture.glossy[i].lobe, wo, turn, mixture.glossy[i].tint, reflectance_);

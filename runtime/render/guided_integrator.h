@@ -15,7 +15,7 @@ std::vector<LobeRequest> lobeRequests(const Scene& scene);
 
 class GuidedSampler {
  public:
-  /// All outlive it. caches: opened for lobeRequests(scene); nullptr: illumination and BSDF only (`guided`).
+  /// The caches outlive it. caches: opened for lobeRequests(scene); nullptr: illumination and BSDF only (`guided`).
   GuidedSampler(const Scene& scene, const IlluminationCache& illumination, const BrdfCaches* caches);
 
   class Vertex {
@@ -41,7 +41,6 @@ class GuidedSampler {
   };
 
  private:
-  const Scene& scene_;
   const IlluminationCache& illumination_;
   const BrdfCaches* caches_;
   std::vector<int> firstRequest_;  // by material

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "runtime/render/shape_geometry.h"
+
 namespace lobe {
 namespace {
 
@@ -13,6 +15,14 @@ DiscreteDistribution trianglesByArea(const TriangleMesh& mesh) {
     areas.push_back(0.5f * (mesh.positions[j] - a).cross(mesh.positions[k] - a).norm());
   }
   return DiscreteDistribution(areas);
+}
+
+/// 0 for what has triangles or stands for other shapes.
+float areaOfAnalytic(const Geometry& geometry) {
+  if (const auto* sphere = std::get_if<Sphere>(&geometry)) return areaOf(*sphere);
+  if (const auto* disk = std::get_if<Disk>(&geometry)) return areaOf(*disk);
+  const auto* cylinder = std::get_if<Cylinder>(&geometry);
+  return cylinder ? areaOf(*cylinder) : 0.0f;
 }
 
 // The cone that a sphere fills as seen from a point outside: 1 − cosθ without cancellation. nullopt: from inside.
@@ -74,11 +84,8 @@ Lights::Lights(const Scene& scene, const Eigen::AlignedBox3f& bounds)
     if (const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry)) {
       light.triangles = trianglesByArea(*mesh);
       light.area = static_cast<float>(light.triangles.total());
-    } else if (const auto* sphere = std::get_if<Sphere>(&shape.geometry)) {
-      light.area = 4.0f * kPi * sphere->radius * sphere->radius;
     } else {
-      const Disk& disk = std::get<Disk>(shape.geometry);
-      light.area = kPi * disk.u.cross(disk.v).norm();
+      light.area = areaOfAnalytic(shape.geometry);
     }
     if (!(light.area > 0.0f)) continue;
     lightOfShape_[i] = static_cast<int>(areas_.size());
@@ -101,6 +108,8 @@ Lights::PointSample Lights::samplePoint(const AreaLight& light, float choice, co
   }
   if (const auto* sphere = std::get_if<Sphere>(&light.shape->geometry))
     return {pointOnSphere(*sphere, squareToSphere(u)), density};
+  if (const auto* cylinder = std::get_if<Cylinder>(&light.shape->geometry))
+    return {pointOnCylinder(*cylinder, 2.0f * kPi * u.x(), u.y()), density};
   const Vec2 d = squareToDisk(u);
   return {pointOnDisk(std::get<Disk>(light.shape->geometry), d.x(), d.y()), density};
 }

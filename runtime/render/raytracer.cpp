@@ -8,76 +8,28 @@
 #include <embree3/rtcore.h>
 #include <fmt/format.h>
 
+#include "runtime/render/shape_geometry.h"
+
 namespace lobe {
 namespace {
 
-// Spheres and disks are solved in double precision: their errors are then those of the ray itself, at any scale.
-using Vec3d = Eigen::Vector3d;
+template <class T>
+constexpr bool kIsAnalytic = !std::is_same_v<T, TriangleMesh> && !std::is_same_v<T, Instance>;
 
-struct Interval {
-  double tnear, tfar;
-  bool contains(double t) const { return t > tnear && t <= tfar; }
-};
-
-std::optional<double> intersectSphere(const Sphere& sphere, const Vec3d& origin, const Vec3d& direction,
-                                      const Interval& range) {
-  // The discriminant from the distance between centre and line does not cancel (Haines et al. 2019).
-  const double a = direction.squaredNorm();
-  const Vec3d f = origin - sphere.centre.cast<double>();
-  const double b = -f.dot(direction);
-  const double radius2 = static_cast<double>(sphere.radius) * sphere.radius;
-  const double discriminant = radius2 - (f + (b / a) * direction).squaredNorm();
-  if (discriminant < 0.0) return std::nullopt;
-  const double q = b + std::copysign(std::sqrt(a * discriminant), b);
-  const double c = f.squaredNorm() - radius2;
-  double t0 = q == 0.0 ? 0.0 : c / q;
-  double t1 = q / a;
-  if (t0 > t1) std::swap(t0, t1);
-  if (range.contains(t0)) return t0;
-  if (range.contains(t1)) return t1;
-  return std::nullopt;
-}
-
-std::optional<double> intersectDisk(const Disk& disk, const Vec3d& origin, const Vec3d& direction,
-                                    const Interval& range) {
-  const Vec3d u = disk.u.cast<double>();
-  const Vec3d v = disk.v.cast<double>();
-  const Vec3d normal = u.cross(v);
-  const Vec3d centre = disk.centre.cast<double>();
-  const double t = (centre - origin).dot(normal) / direction.dot(normal);
-  if (!range.contains(t)) return std::nullopt;  // also where the ray runs along the plane (t is no number)
-  const Vec3d p = origin + t * direction - centre;
-  const double x = p.dot(u) / u.squaredNorm();
-  const double y = p.dot(v) / v.squaredNorm();
-  if (x * x + y * y > 1.0) return std::nullopt;
-  return t;
-}
-
-std::optional<double> intersectGeometry(const Geometry& geometry, const Vec3d& o, const Vec3d& d,
-                                        const Interval& range) {
-  if (const auto* sphere = std::get_if<Sphere>(&geometry)) return intersectSphere(*sphere, o, d, range);
-  if (const auto* disk = std::get_if<Disk>(&geometry)) return intersectDisk(*disk, o, d, range);
-  return std::nullopt;
-}
-
-Eigen::AlignedBox3f boundsOf(const TriangleMesh& mesh) {
-  Eigen::AlignedBox3f box;
-  for (const auto& triangle : mesh.triangles)
-    for (const std::uint32_t i : triangle) box.extend(mesh.positions[i]);
-  return box;
-}
-Eigen::AlignedBox3f boundsOf(const Sphere& sphere) {
-  const Vec3 r = Vec3::Constant(sphere.radius);
-  return {sphere.centre - r, sphere.centre + r};
-}
-Eigen::AlignedBox3f boundsOf(const Disk& disk) {
-  const Vec3 r = (disk.u.array().square() + disk.v.array().square()).sqrt();
-  return {disk.centre - r, disk.centre + r};
+/// Box of a shape of the scene, of which the groups it may show have theirs.
+Eigen::AlignedBox3f boundsOf(const Geometry& geometry, const std::vector<Eigen::AlignedBox3f>& groups) {
+  return std::visit(
+      [&](const auto& g) {
+        if constexpr (std::is_same_v<std::decay_t<decltype(g)>, Instance>)
+          return groups[g.group].isEmpty() ? groups[g.group] : groups[g.group].transformed(g.toWorld);
+        else
+          return lobe::boundsOf(g);
+      },
+      geometry);
 }
 
 void reportBounds(const RTCBoundsFunctionArguments* args) {
-  const Shape& shape = *static_cast<const Shape*>(args->geometryUserPtr);
-  Eigen::AlignedBox3f box = std::visit([](const auto& g) { return boundsOf(g); }, shape.geometry);
+  Eigen::AlignedBox3f box = boundsOf(static_cast<const Shape*>(args->geometryUserPtr)->geometry, {});
   // The box was rounded; it has to contain the shape.
   const Vec3 margin = (box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs())) * 0x1p-21f;
   box = {box.min() - margin, box.max() + margin};
@@ -86,9 +38,16 @@ void reportBounds(const RTCBoundsFunctionArguments* args) {
 
 // Only single rays are traced, so a callback's one ray has the layout of RTCRay.
 std::optional<double> intersectUser(const Shape& shape, const RTCRay& ray) {
-  const Vec3d origin(ray.org_x, ray.org_y, ray.org_z);
-  const Vec3d direction(ray.dir_x, ray.dir_y, ray.dir_z);
-  return intersectGeometry(shape.geometry, origin, direction, {ray.tnear, ray.tfar});
+  const Eigen::Vector3d origin(ray.org_x, ray.org_y, ray.org_z);
+  const Eigen::Vector3d direction(ray.dir_x, ray.dir_y, ray.dir_z);
+  return std::visit(
+      [&](const auto& g) -> std::optional<double> {
+        if constexpr (kIsAnalytic<std::decay_t<decltype(g)>>)
+          return intersectShape(g, origin, direction, {ray.tnear, ray.tfar});
+        else
+          return std::nullopt;
+      },
+      shape.geometry);
 }
 
 void intersectCallback(const RTCIntersectFunctionNArguments* args) {
@@ -142,9 +101,14 @@ void fillUser(RTCGeometry geometry, const Shape& shape) {
   rtcSetGeometryOccludedFunction(geometry, occludedCallback);
 }
 
-bool isEmptyMesh(const Shape& shape) {
-  const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry);
-  return mesh && mesh->triangles.empty();
+void fillInstance(RTCGeometry geometry, const Instance& instance, RTCScene group) {
+  rtcSetGeometryInstancedScene(geometry, group);
+  rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT4X4_COLUMN_MAJOR, instance.toWorld.matrix().data());
+}
+
+RTCGeometryType geometryType(const Shape& shape) {
+  if (std::holds_alternative<TriangleMesh>(shape.geometry)) return RTC_GEOMETRY_TYPE_TRIANGLE;
+  return std::holds_alternative<Instance>(shape.geometry) ? RTC_GEOMETRY_TYPE_INSTANCE : RTC_GEOMETRY_TYPE_USER;
 }
 
 }  // namespace
@@ -152,55 +116,68 @@ bool isEmptyMesh(const Shape& shape) {
 struct RayTracer::Embree {
   RTCDevice device = rtcNewDevice(nullptr);
   RTCScene scene = nullptr;
+  std::vector<RTCScene> groups;
+  std::vector<Eigen::AlignedBox3f> groupBounds;
+  Eigen::AlignedBox3f bounds;
 
-  Embree() {
+  explicit Embree(const Scene& source) {
     if (!device) throw std::runtime_error("Embree: no device");
     rtcSetDeviceErrorFunction(
         device,
         [](void* text, RTCError, const char* message) { *static_cast<std::string*>(text) = message ? message : "?"; },
         &error);
-    scene = rtcNewScene(device);
-    // Robust: rays do not slip through shared edges. High quality: built once, traced hundreds of millions of times.
-    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
-    rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
+    for (const ShapeGroup& group : source.groups) {
+      Eigen::AlignedBox3f box;
+      groups.push_back(build(group.shapes, box));
+      groupBounds.push_back(box);
+    }
+    scene = build(source.shapes, bounds);
   }
   Embree(const Embree&) = delete;
   Embree& operator=(const Embree&) = delete;
   ~Embree() {
     if (scene) rtcReleaseScene(scene);
+    for (RTCScene group : groups) rtcReleaseScene(group);
     if (device) rtcReleaseDevice(device);
   }
 
-  void add(const Shape& shape, unsigned id) {
-    const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry);
-    RTCGeometry geometry = rtcNewGeometry(device, mesh ? RTC_GEOMETRY_TYPE_TRIANGLE : RTC_GEOMETRY_TYPE_USER);
-    if (mesh)
+ private:
+  RTCScene build(const std::vector<Shape>& shapes, Eigen::AlignedBox3f& box) {
+    RTCScene result = rtcNewScene(device);
+    // Robust: rays do not slip through shared edges. High quality: built once, traced hundreds of millions of times.
+    rtcSetSceneFlags(result, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneBuildQuality(result, RTC_BUILD_QUALITY_HIGH);
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      const Eigen::AlignedBox3f shapeBox = boundsOf(shapes[i].geometry, groupBounds);
+      if (shapeBox.isEmpty()) continue;
+      box.extend(shapeBox);
+      add(result, shapes[i], static_cast<unsigned>(i));
+    }
+    rtcCommitScene(result);
+    if (!error.empty()) throw std::runtime_error(fmt::format("Embree: {}", error));
+    return result;
+  }
+
+  void add(RTCScene to, const Shape& shape, unsigned id) {
+    RTCGeometry geometry = rtcNewGeometry(device, geometryType(shape));
+    if (const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry))
       fillMesh(geometry, *mesh);
+    else if (const auto* instance = std::get_if<Instance>(&shape.geometry))
+      fillInstance(geometry, *instance, groups[instance->group]);
     else
       fillUser(geometry, shape);
     rtcCommitGeometry(geometry);
-    rtcAttachGeometryByID(scene, geometry, id);
+    rtcAttachGeometryByID(to, geometry, id);
     rtcReleaseGeometry(geometry);
-  }
-
-  void commit() {
-    rtcCommitScene(scene);
-    if (!error.empty()) throw std::runtime_error(fmt::format("Embree: {}", error));
   }
 
   std::string error;
 };
 
-RayTracer::RayTracer(const Scene& scene) : scene_(scene) {
-  auto embree = std::make_shared<Embree>();
-  for (std::size_t i = 0; i < scene.shapes.size(); ++i) {
-    const Shape& shape = scene.shapes[i];
-    if (isEmptyMesh(shape)) continue;
-    embree->add(shape, static_cast<unsigned>(i));
-    bounds_.extend(std::visit([](const auto& g) { return boundsOf(g); }, shape.geometry));
-  }
-  embree->commit();
-  embree_ = std::move(embree);
+RayTracer::RayTracer(const Scene& scene) : scene_(scene), embree_(std::make_shared<Embree>(scene)) {}
+
+const Eigen::AlignedBox3f& RayTracer::bounds() const {
+  return embree_->bounds;
 }
 
 std::optional<Hit> RayTracer::intersect(const Ray& ray) const {
@@ -209,8 +186,11 @@ std::optional<Hit> RayTracer::intersect(const Ray& ray) const {
   RTCRayHit query{embreeRay(ray), {}};
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(embree_->scene, &context, &query);
-  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-  return Hit{query.ray.tfar, query.hit.geomID, query.hit.primID, query.hit.u, query.hit.v};
+  const RTCHit& hit = query.hit;
+  if (hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+  const bool instanced = hit.instID[0] != RTC_INVALID_GEOMETRY_ID;
+  return Hit{query.ray.tfar, instanced ? hit.instID[0] : hit.geomID, instanced ? hit.geomID : 0, hit.primID, hit.u,
+             hit.v};
 }
 
 std::optional<SurfaceHit> RayTracer::trace(const Ray& ray) const {

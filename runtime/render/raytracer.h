@@ -28,12 +28,11 @@ class RayTracer {
   bool occluded(const Ray& ray) const;
 
   /// Of all shapes; empty without shapes.
-  const Eigen::AlignedBox3f& bounds() const { return bounds_; }
+  const Eigen::AlignedBox3f& bounds() const;
 
  private:
   struct Embree;
   const Scene& scene_;
-  Eigen::AlignedBox3f bounds_;
   std::shared_ptr<const Embree> embree_;
 };
 

@@ -1,5 +1,7 @@
 #include "runtime/render/surface_hit.h"
 
+#include <stdexcept>
+
 #include "materials/sampling.h"
 
 namespace lobe {
@@ -41,17 +43,26 @@ Derivatives triangleDerivatives(const TriangleMesh& mesh, std::uint32_t triangle
 }
 
 Derivatives sphereDerivatives(const Sphere& sphere, const Vec3& position) {
-  const Vec3 p = position - sphere.centre;
+  const Vec3 p = sphere.axes.transpose() * (position - sphere.centre);
   const float radial = p.head<2>().norm();
   if (radial == 0.0f) return {};
   const Vec3 dpdv(p.x() * p.z() / radial, p.y() * p.z() / radial, -radial);
-  return {2.0f * kPi * Vec3(-p.y(), p.x(), 0.0f), kPi * dpdv};
+  return {2.0f * kPi * sphere.axes * Vec3(-p.y(), p.x(), 0.0f), kPi * sphere.axes * dpdv};
 }
 
 Derivatives diskDerivatives(const Disk& disk, float x, float y) {
   const float radius = std::sqrt(x * x + y * y);
   if (radius == 0.0f) return {disk.u, disk.v};
   return {(x * disk.u + y * disk.v) / radius, 2.0f * kPi * (x * disk.v - y * disk.u)};
+}
+
+Derivatives cylinderDerivatives(const Cylinder& cylinder, float azimuth) {
+  return {2.0f * kPi * (std::cos(azimuth) * cylinder.v - std::sin(azimuth) * cylinder.u), cylinder.axis};
+}
+
+float toUnitAzimuth(float azimuth) {
+  const float turns = azimuth * (0.5f * kInvPi);
+  return turns < 0.0f ? turns + 1.0f : turns;
 }
 
 Vec3 interpolatedNormal(const TriangleMesh& mesh, const Hit& hit, const Vec3& geometric) {
@@ -87,6 +98,45 @@ Resolved resolve(const Disk& disk, const Ray& ray, const Hit& hit) {
   return {point, point.normal, diskDerivatives(disk, x, y)};
 }
 
+Resolved resolve(const Cylinder& cylinder, const Ray& ray, const Hit& hit) {
+  const Vec3 p = ray.origin + hit.t * ray.direction - cylinder.base;
+  const float azimuth = std::atan2(p.dot(cylinder.v), p.dot(cylinder.u));
+  const SurfacePoint point = pointOnCylinder(cylinder, azimuth, p.dot(cylinder.axis) / cylinder.axis.squaredNorm());
+  return {point, point.normal, cylinderDerivatives(cylinder, azimuth)};
+}
+
+/// Out of the space of a group. The offset grows with the errors of both spaces.
+Resolved transformed(const Resolved& r, const Eigen::Affine3f& toWorld) {
+  const Eigen::Matrix3f linear = toWorld.linear();
+  const Eigen::Matrix3f forNormals = linear.inverse().transpose();
+  Resolved result = r;
+  result.point.position = toWorld * r.point.position;
+  result.point.normal = (forNormals * r.point.normal).normalized();
+  const Vec3 extent = linear.cwiseAbs() * r.point.position.cwiseAbs() + toWorld.translation().cwiseAbs();
+  result.point.offset = r.point.offset * linear.norm() + offsetLength(result.point.normal, extent);
+  result.shadingNormal = (forNormals * r.shadingNormal).normalized();
+  result.derivatives = {linear * r.derivatives.dpdu, linear * r.derivatives.dpdv};
+  return result;
+}
+
+Resolved resolve(const Shape& shape, const Ray& ray, const Hit& hit) {
+  return std::visit(
+      [&](const auto& geometry) -> Resolved {
+        if constexpr (std::is_same_v<std::decay_t<decltype(geometry)>, Instance>)
+          throw std::logic_error("an instance of an instance");
+        else
+          return resolve(geometry, ray, hit);
+      },
+      shape.geometry);
+}
+
+/// A distance along a ray is the same in both spaces, as its direction is not made unit again.
+Resolved resolveInstanced(const Instance& instance, const Shape& shape, const Ray& ray, const Hit& hit) {
+  const Eigen::Affine3f toGroup = instance.toWorld.inverse();
+  const Ray inGroup{toGroup * ray.origin, toGroup.linear() * ray.direction};
+  return transformed(resolve(shape, inGroup, hit), instance.toWorld);
+}
+
 Vec3 facing(const Vec3& normal, const Vec3& side) {
   return normal.dot(side) < 0.0f ? Vec3(-normal) : normal;
 }
@@ -120,9 +170,8 @@ SurfacePoint pointOnSphere(const Sphere& sphere, const Vec3& outward) {
   SurfacePoint point;
   point.position = sphere.centre + sphere.radius * outward;
   point.normal = sphere.flipped ? Vec3(-outward) : outward;
-  const float azimuth = std::atan2(outward.y(), outward.x()) * (0.5f * kInvPi);
-  const float polar = std::atan2(outward.head<2>().norm(), outward.z()) * kInvPi;
-  point.uv = {azimuth < 0.0f ? azimuth + 1.0f : azimuth, polar};
+  const Vec3 own = sphere.axes.transpose() * outward;
+  point.uv = {toUnitAzimuth(std::atan2(own.y(), own.x())), std::atan2(own.head<2>().norm(), own.z()) * kInvPi};
   point.offset = offsetLength(point.normal, sphere.centre.cwiseAbs() + Vec3::Constant(sphere.radius));
   return point;
 }
@@ -130,16 +179,29 @@ SurfacePoint pointOnSphere(const Sphere& sphere, const Vec3& outward) {
 SurfacePoint pointOnDisk(const Disk& disk, float x, float y) {
   SurfacePoint point;
   point.position = disk.centre + x * disk.u + y * disk.v;
-  point.normal = triangleNormal(disk.u, disk.v);
-  const float azimuth = std::atan2(y, x) * (0.5f * kInvPi);
-  point.uv = {std::sqrt(x * x + y * y), azimuth < 0.0f ? azimuth + 1.0f : azimuth};
+  point.normal = (disk.flipped ? -1.0f : 1.0f) * triangleNormal(disk.u, disk.v);
+  point.uv = {std::sqrt(x * x + y * y), toUnitAzimuth(std::atan2(y, x))};
   point.offset = offsetLength(point.normal, disk.centre.cwiseAbs() + disk.u.cwiseAbs() + disk.v.cwiseAbs());
   return point;
 }
 
+SurfacePoint pointOnCylinder(const Cylinder& cylinder, float azimuth, float height) {
+  SurfacePoint point;
+  const Vec3 radial = std::cos(azimuth) * cylinder.u + std::sin(azimuth) * cylinder.v;
+  point.position = cylinder.base + radial + height * cylinder.axis;
+  point.normal = (cylinder.flipped ? -radial : radial).normalized();
+  point.uv = {toUnitAzimuth(azimuth), height};
+  const Vec3 extent =
+      cylinder.base.cwiseAbs() + cylinder.axis.cwiseAbs() + cylinder.u.cwiseAbs() + cylinder.v.cwiseAbs();
+  point.offset = offsetLength(point.normal, extent);
+  return point;
+}
+
 SurfaceHit makeSurfaceHit(const Scene& scene, const Ray& ray, const Hit& hit) {
-  const Shape& shape = scene.shapes[hit.shape];
-  const Resolved r = std::visit([&](const auto& geometry) { return resolve(geometry, ray, hit); }, shape.geometry);
+  const Shape& placed = scene.shapes[hit.shape];
+  const auto* instance = std::get_if<Instance>(&placed.geometry);
+  const Shape& shape = instance ? scene.groups[instance->group].shapes[hit.member] : placed;
+  const Resolved r = instance ? resolveInstanced(*instance, shape, ray, hit) : resolve(shape, ray, hit);
   SurfaceHit result;
   static_cast<SurfacePoint&>(result) = r.point;
   result.bsdf = shape.material < 0 ? nullptr : scene.materials[shape.material].bsdf.get();
@@ -149,6 +211,7 @@ SurfaceHit makeSurfaceHit(const Scene& scene, const Ray& ray, const Hit& hit) {
   result.wo = result.frame.toLocal(result.woWorld);
   result.distance = hit.t;
   result.shape = static_cast<int>(hit.shape);
+  result.material = shape.material;
   return result;
 }
 

@@ -14,14 +14,15 @@ namespace lobe {
 struct Hit {
   float t;
   std::uint32_t shape;      ///< index into Scene::shapes
+  std::uint32_t member;     ///< index into the group's shapes where the shape is an instance, else 0
   std::uint32_t primitive;  ///< triangle of a mesh, else 0
-  float u, v;               ///< barycentric weights of the second and third vertex; unused for spheres and disks
+  float u, v;               ///< barycentric weights of the second and third vertex; unused for other shapes
 };
 
 /// A point on a shape, without regard to who looks at it.
 struct SurfacePoint {
   Vec3 position;
-  Vec3 normal;  ///< unit, on the front side (winding; outside of a sphere unless flipped)
+  Vec3 normal;  ///< unit, on the front side (winding; outside of a sphere or cylinder unless flipped)
   Vec2 uv;
   float offset;  ///< world units by which rays that start here are moved along the normal
 };
@@ -32,17 +33,20 @@ struct SurfaceHit : SurfacePoint {
   Vec3 woWorld;                ///< the same in world space
   float distance;              ///< of the hit along its ray
   int shape;                   ///< index into Scene::shapes
+  int material;                ///< index into Scene::materials; −1 without bsdf
   const Bsdf* bsdf;            ///< nullptr: the surface absorbs everything
   const AreaEmitter* emitter;  ///< nullptr: none
 };
 
 /// The point of barycentric weights (1−b1−b2, b1, b2) on a triangle.
 SurfacePoint pointOnTriangle(const TriangleMesh& mesh, std::uint32_t triangle, float b1, float b2);
-/// The point of the sphere in the unit direction `outward` from its centre. uv is as Mitsuba's: azimuth about +z over
-/// 2π, then the angle from +z over π.
+/// The point of the sphere in the unit direction `outward` from its centre. uv as Mitsuba's: azimuth about the sphere's
+/// own z axis over 2π, then the angle from that axis over π.
 SurfacePoint pointOnSphere(const Sphere& sphere, const Vec3& outward);
 /// The point centre + x·u + y·v.
 SurfacePoint pointOnDisk(const Disk& disk, float x, float y);
+/// The point at an azimuth from u towards v, at a height in units of the axis.
+SurfacePoint pointOnCylinder(const Cylinder& cylinder, float azimuth, float height);
 
 /// Fills in all of a SurfaceHit from what the ray tracer says. The ray's direction is unit.
 SurfaceHit makeSurfaceHit(const Scene& scene, const Ray& ray, const Hit& hit);
