@@ -12,6 +12,8 @@ BsdfPtr makeDielectric(const Parameters& parameters);
 BsdfPtr makeDiffTrans(const Parameters& parameters);
 BsdfPtr makeDiffuse(const Parameters& parameters);
 BsdfPtr makeMask(const Parameters& parameters);
+BsdfPtr makeMeasured(const Parameters& parameters);
+BsdfPtr makeMerl(const Parameters& parameters);
 BsdfPtr makeMixture(const Parameters& parameters);
 BsdfPtr makeNormalMap(const Parameters& parameters);
 BsdfPtr makeNull(const Parameters& parameters);

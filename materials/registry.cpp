@@ -23,6 +23,8 @@ constexpr std::array kModels = {
     Entry{"difftrans", makeDiffTrans},
     Entry{"diffuse", makeDiffuse},
     Entry{"mask", makeMask},
+    Entry{"measured", makeMeasured},
+    Entry{"merl", makeMerl},
     Entry{"mixturebsdf", makeMixture},
     Entry{"normalmap", makeNormalMap},
     Entry{"null", makeNull},

@@ -33,7 +33,7 @@ class SceneReader {
     if (tag == "shape")
       shapes_.add(node);
     else if (tag == "bsdf")
-      materials_.read(node);
+      materials_.check(node);
     else if (tag == "texture")
       textures_.read(node);
     else if (tag == "emitter")

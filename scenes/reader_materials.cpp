@@ -16,7 +16,16 @@ BsdfPtr makeDiffuseOf(float reflectance) {
   return makeBsdf("diffuse", parameters);
 }
 
+bool namesMeasurement(pugi::xml_node node) {
+  const std::string_view type = node.attribute("type").value();
+  return elementName(node) == "bsdf" && (type == "measured" || type == "merl");
+}
+
 }  // namespace
+
+void MaterialReader::check(pugi::xml_node node) {
+  if (!namesMeasurement(node) && !node.find_node(namesMeasurement)) read(node);
+}
 
 BsdfPtr MaterialReader::read(pugi::xml_node node) {
   const auto [entry, isNew] = done_.try_emplace(SceneFile::location(node));
@@ -43,8 +52,22 @@ BsdfPtr MaterialReader::make(pugi::xml_node node) {
     parameters.addChild(read(child));
     return true;
   };
-  const Parameters parameters = readParameters(context_, node, "texture, bsdf, ref", onChild);
+  Parameters parameters = readParameters(context_, node, "texture, bsdf, ref", onChild);
+  if (namesMeasurement(node) && !resolveFile(node, parameters)) return makeDiffuseOf(0.5f);
   return makeFrom(context_, node, parameters, [&](const Parameters& p) { return makeBsdf(type, p); });
+}
+
+bool MaterialReader::resolveFile(pugi::xml_node node, Parameters& parameters) {
+  if (!parameters.holdsText("filename")) return true;  // the model says what is wrong
+  const std::filesystem::path path = context_.file.resolve(parameters.text("filename", ""));
+  const std::ptrdiff_t location = parameters.location("filename");
+  if (!std::filesystem::exists(path)) {
+    context_.unsupported(location, "missing file " + path.string(),
+                         fmt::format("{}: {} is not there", describe(node), path.string()), "diffuse 0.5 is used");
+    return false;
+  }
+  parameters.set("filename", path.string(), location);
+  return true;
 }
 
 int MaterialReader::use(pugi::xml_node node) {

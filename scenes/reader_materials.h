@@ -11,6 +11,10 @@ class MaterialReader {
  public:
   MaterialReader(ReadContext& context, TextureReader& textures) : context_(context), textures_(textures) {}
 
+  /// Reads an element that the scene has at its top, so that its faults are found whether it is used or not; except
+  /// that measured materials, whose files are large and need not be there, are left until something uses them.
+  void check(pugi::xml_node node);
+
   /// Each element is read once. Throws SceneError.
   BsdfPtr read(pugi::xml_node node);
 
@@ -21,6 +25,8 @@ class MaterialReader {
 
  private:
   BsdfPtr make(pugi::xml_node node);
+  /// Makes the file's name one from the scene's folder. Returns whether the file is there, if its lack is tolerated.
+  bool resolveFile(pugi::xml_node node, Parameters& parameters);
   int add(std::string name, BsdfPtr bsdf);
 
   ReadContext& context_;

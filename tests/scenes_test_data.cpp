@@ -55,6 +55,22 @@ TEST_CASE("scenes: our own jewelry") {
   CHECK(scene.filter.kind == PixelFilter::Kind::box);
 }
 
+TEST_CASE("scenes: measured materials in our own scenes") {
+  const char* folder = dataFolder();
+  if (!folder) return;
+  const auto [type, file] = GENERATE(std::pair{"measured", "paper_white_rgb"}, std::pair{"merl", "pink-fabric"});
+  const std::string suffix = std::string(type) == "merl" ? ".binary" : ".bsdf";
+  ReadOptions options;
+  options.definitions = {{"type", type}, {"file", std::string(folder) + "/measured/" + file + suffix}};
+  const Scene ball = readScene(LOBE_SOURCE_DIR "/scenes/measured.xml", options);
+  checkConsistent(ball);
+  CHECK(ball.materials[1].bsdf->lobes()[0]->summary() == file);
+  options.definitions["bowl"] = "Measured";
+  const Scene jewelry = readScene(LOBE_SOURCE_DIR "/scenes/jewelry.xml", options);
+  checkConsistent(jewelry);
+  CHECK(std::ranges::count(jewelry.materials, "Measured", &Material::name) == 1);
+}
+
 TEST_CASE("scenes: scenes from elsewhere") {
   const char* folder = dataFolder();
   if (!folder) return;

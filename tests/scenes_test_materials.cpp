@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "measured_files.h"
 #include "scenes_test_tools.h"
 
 namespace lobe {
@@ -125,6 +126,38 @@ TEST_CASE("scenes: phong, ward and roughdiffuse as Mitsuba 0.6 spells them") {
   INFO(fault);
   CHECK(fault.starts_with("test.xml:3:1: "));
   CHECK(fault.find("diffuse_reflectance, exponent, specular_reflectance") != std::string::npos);
+}
+
+TEST_CASE("scenes: measured materials are read from beside the scene, and only where something is made of them") {
+  const TestFolder folder;
+  const auto fields = measuredFields([](const auto&, const auto&) { return grey(0.1f); }, {0.0f}, 4);
+  std::filesystem::create_directory(folder.path() / "data");
+  folder.write("data/paint_rgb.bsdf", tensorFile(fields));
+  const std::string unused =
+      "<bsdf type=\"twosided\" id=\"Unused\"><bsdf type=\"merl\"><string name=\"filename\" "
+      "value=\"none\"/></bsdf></bsdf>";
+  const std::string paint =
+      "<bsdf type=\"measured\" id=\"Paint\"><string name=\"filename\" value=\"data/paint_rgb.bsdf\"/></bsdf>";
+  const std::string shape = "<shape type=\"sphere\"><ref id=\"Paint\"/></shape>";
+  const Scene scene = readScene(folder.write("test.xml", sceneOf(unused + paint + shape + shape)));
+  REQUIRE(scene.materials.size() == 1);
+  REQUIRE(scene.materials[0].bsdf->lobes().size() == 1);
+  CHECK(scene.materials[0].bsdf->lobes()[0]->summary() == "paint_rgb");
+}
+
+TEST_CASE("scenes: faults of measured materials are told at their place") {
+  const auto inSphere = [](const std::string& type, const std::string& parameters) {
+    return "<shape type=\"sphere\">\n<bsdf type=\"" + type + "\">\n " + parameters + "</bsdf></shape>";
+  };
+  const std::string missing = inSphere("measured", "<string name=\"filename\" value=\"none_rgb.bsdf\"/>");
+  CHECK_THAT(faultOf(missing), Catch::StartsWith("test.xml:4:2: ") && Catch::Contains("none_rgb.bsdf is not there"));
+  CHECK(readBody(missing, lenient()).warnings.size() == 1);
+  // The scene itself is no measurement.
+  for (const std::string type : {"measured", "merl"})
+    CHECK_THAT(faultOf(inSphere(type, "<string name=\"filename\" value=\"test.xml\"/>")),
+               Catch::StartsWith("test.xml:4:2: ") && Catch::Contains("not a"));
+  CHECK_THAT(faultOf(inSphere("merl", "")), Catch::StartsWith("test.xml:3:1: ") && Catch::Contains("\"filename\""));
+  CHECK_THAT(faultOf(inSphere("measured", "<float name=\"filename\" value=\"1\"/>")), Catch::Contains("text"));
 }
 
 }  // namespace lobe
