@@ -22,10 +22,13 @@ Rgb fresnelConductor(float cosIncident, const Rgb& eta, const Rgb& k) {
   const Rgb t = eta.square() - k.square() - sin2;
   const Rgb r = (t.square() + 4.0f * eta.square() * k.square()).sqrt();  // a² + b²
   const Rgb a = (0.5f * (r + t)).max(0.0f).sqrt();
-  constexpr float kTiny = 1e-20f;  // an interface that is none, seen edge on, is 0/0
-  const Rgb s = (r + cos2 - 2.0f * c * a) / (r + cos2 + 2.0f * c * a).max(kTiny);
-  const Rgb p =
-      s * (r * cos2 + sin2 * sin2 - 2.0f * c * sin2 * a) / (r * cos2 + sin2 * sin2 + 2.0f * c * sin2 * a).max(kTiny);
+  // An interface that is none is 0/0 edge on, one of zero index seen from straight above: both tend to one.
+  static constexpr float kTiny = 1e-20f;
+  const auto ratio = [](const Rgb& sum, const Rgb& twice) {
+    return ((sum - twice + kTiny) / (sum + twice + kTiny)).eval();
+  };
+  const Rgb s = ratio(r + cos2, 2.0f * c * a);
+  const Rgb p = s * ratio(r * cos2 + sin2 * sin2, 2.0f * c * sin2 * a);
   return (0.5f * (s + p)).max(0.0f).min(1.0f);
 }
 

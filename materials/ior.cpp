@@ -90,6 +90,15 @@ const auto& lookUp(const Table& table, std::string_view parameter, const std::st
                        fmt::format("unknown {} \"{}\"; known are a number, or {}", parameter, wanted, known));
 }
 
+/// A spectrum fitted by three numbers may have overshot: negative ones become zero, the closest that can be.
+Rgb readNotNegative(const Parameters& parameters, std::string_view name, const float (&preset)[3]) {
+  const Rgb colour = parameters.colour(name, Rgb(preset[0], preset[1], preset[2]));
+  if (!colour.allFinite()) throw ParameterError(std::string(name), fmt::format("{} must be finite", name));
+  if ((colour < 0.0f).any())
+    parameters.note(fmt::format("negative {} {}, {}, {} is taken as zero", name, colour.x(), colour.y(), colour.z()));
+  return colour.max(0.0f);
+}
+
 }  // namespace
 
 double readIor(const Parameters& parameters, std::string_view name, std::string_view fallback) {
@@ -107,11 +116,8 @@ double readRelativeIor(const Parameters& parameters, std::string_view interiorFa
 ComplexIor readConductor(const Parameters& parameters) {
   const NamedConductor& preset = lookUp(kConductors, "material", parameters.text("material", "Cu"));
   const float outside = static_cast<float>(readIor(parameters, "ext_eta", "air"));
-  const Rgb eta = parameters.colour("eta", Rgb(preset.eta[0], preset.eta[1], preset.eta[2]));
-  const Rgb k = parameters.colour("k", Rgb(preset.k[0], preset.k[1], preset.k[2]));
-  if (!(eta >= 0.0f).all()) throw ParameterError("eta", "eta must not be negative");
-  if (!(k >= 0.0f).all()) throw ParameterError("k", "k must not be negative");
-  return {eta / outside, k / outside};
+  const Rgb eta = readNotNegative(parameters, "eta", preset.eta);
+  return {eta / outside, readNotNegative(parameters, "k", preset.k) / outside};
 }
 
 }  // namespace lobe

@@ -20,7 +20,8 @@ struct ComplexIor {
 };
 
 /// material (default Cu; "none" is a perfect mirror), eta, k and ext_eta (default air), which both are divided by.
-/// ParameterError: an unknown name or an index that is not positive.
+/// Negative components of eta and k become zero, with a note. ParameterError: an unknown name, a number that is not
+/// finite, or an ext_eta that is not positive.
 ComplexIor readConductor(const Parameters& parameters);
 
 }  // namespace lobe

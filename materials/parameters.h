@@ -59,6 +59,10 @@ class Parameters {
   const std::set<std::string, std::less<>>& asked() const { return asked_; }
   std::ptrdiff_t location(std::string_view name) const;  ///< 0 when unknown
 
+  /// Something the user should know of what became of the parameters, one line; libraries do not print.
+  void note(std::string text) const { notes_.push_back(std::move(text)); }
+  const std::vector<std::string>& notes() const { return notes_; }
+
  private:
   struct Entry {
     ParameterValue value;
@@ -69,6 +73,7 @@ class Parameters {
 
   std::map<std::string, Entry, std::less<>> entries_;
   mutable std::set<std::string, std::less<>> asked_;
+  mutable std::vector<std::string> notes_;
   std::vector<BsdfPtr> children_;
 };
 

@@ -113,6 +113,19 @@ TEST_CASE("materials: every parameter of a model is used, so that leftovers are 
   CHECK(unused("diffuse", parametersOf({{"reflectanse", 0.1}})) == std::vector<std::string>{"reflectanse"});
 }
 
+TEST_CASE("materials: negative indices of metals become zero, and the user is told") {
+  const Parameters p =
+      parametersOf({{"eta", Rgb(-0.05f, 4.1f, 4.7f)}, {"k", Rgb(-0.04f, 0.09f, 1.3f)}, {"alpha", 0.1}});
+  const BsdfPtr metal = makeBsdf("roughconductor", p);
+  const BsdfPtr clamped =
+      bsdfOf("roughconductor", {{"eta", Rgb(0.0f, 4.1f, 4.7f)}, {"k", Rgb(0.0f, 0.09f, 1.3f)}, {"alpha", 0.1}});
+  const Vec3 wo = directionAt(20.0), wi = directionAt(22.0, 180.0);
+  CHECK((metal->eval(wo, wi, kUv) == clamped->eval(wo, wi, kUv)).all());
+  REQUIRE(p.notes().size() == 2);
+  CHECK_THAT(p.notes()[0], Contains("eta") && Contains("-0.05") && Contains("zero"));
+  CHECK_THAT(messageOf("conductor", {{"k", grey(std::nanf(""))}}), Contains("finite"));
+}
+
 TEST_CASE("materials: Fresnel against closed forms") {
   CHECK(fresnelDielectric(1.0, 1.5).reflectance == Approx(0.04));
   CHECK(fresnelDielectric(0.0, 1.5).reflectance == Approx(1.0));
@@ -127,6 +140,10 @@ TEST_CASE("materials: Fresnel against closed forms") {
           Approx(fresnelDielectric(c, 1.5).reflectance).margin(1e-5));
   CHECK(fresnelConductor(1.0f, grey(0.2f), grey(3.0f)).x() == Approx((0.64 + 9.0) / (1.44 + 9.0)));
   CHECK(fresnelConductor(0.3f, grey(0.0f), grey(1.0f)).x() == Approx(1.0));
+  // An index of zero, as fits to spectra have it, reflects all.
+  for (const float c : {0.0f, 1e-4f, 0.5f, 1.0f})
+    CHECK((fresnelConductor(c, grey(0.0f), grey(0.0f)) - 1.0f).abs().maxCoeff() < 1e-5f);
+  CHECK(fresnelConductor(1.0f, grey(1.0f), grey(0.0f)).x() == Approx(0.0f).margin(1e-6));
   // Walsh's closed form of the diffuse reflectance.
   const double n = 1.5, n2 = n * n, n4 = n2 * n2;
   const double walsh = 0.5 + (n - 1) * (3 * n + 1) / (6 * (n + 1) * (n + 1)) +
