@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace lobe {
@@ -25,6 +26,16 @@ Rgb meanOf(const Image& image) {
   return (sum / static_cast<double>(image.pixels.size())).cast<float>();
 }
 
+/// Interpolation stays between pixels. Pixels that are not numbers do not count.
+TextureRange rangeOf(const Image& image) {
+  TextureRange range{std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()};
+  for (const Rgb& pixel : image.pixels) {
+    range.smallest = std::min(range.smallest, luminance(pixel));
+    range.largest = std::max(range.largest, luminance(pixel));
+  }
+  return range.smallest <= range.largest ? range : TextureRange{0.0f, 0.0f};
+}
+
 class BitmapTexture final : public Texture {
  public:
   BitmapTexture(std::shared_ptr<const Image> image, const BitmapOptions& options)
@@ -39,6 +50,7 @@ class BitmapTexture final : public Texture {
   }
 
   Rgb mean() const override { return mean_; }
+  TextureRange range() const override { return rangeOf(*image_); }
 
  private:
   Rgb bilinear(float x, float y) const {

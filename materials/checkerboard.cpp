@@ -1,5 +1,6 @@
 #include "materials/checkerboard.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace lobe {
@@ -16,6 +17,10 @@ class CheckerboardTexture final : public Texture {
   }
 
   Rgb mean() const override { return 0.5f * (a_->mean() + b_->mean()); }
+  TextureRange range() const override {
+    const TextureRange a = a_->range(), b = b_->range();
+    return {std::min(a.smallest, b.smallest), std::max(a.largest, b.largest)};
+  }
 
  private:
   static bool upperHalf(float x) { return x - std::floor(x) > 0.5f; }

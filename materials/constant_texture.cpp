@@ -8,6 +8,7 @@ class ConstantTexture final : public Texture {
   explicit ConstantTexture(const Rgb& colour) : colour_(colour) {}
   Rgb eval(const Vec2&) const override { return colour_; }
   Rgb mean() const override { return colour_; }
+  TextureRange range() const override { return {luminance(colour_), luminance(colour_)}; }
 
  private:
   Rgb colour_;

@@ -6,14 +6,14 @@
 namespace lobe {
 
 /// Light that crosses the coating scatters diffusely, and is partly thrown back by the coating from within, again and
-/// again. What leaves is colour(uv) · T(cosθo) · T(cosθi) / π, T being the coating's transmittance from outside.
+/// again. What leaves is colour · T(cosθo) · T(cosθi) / π, T being the coating's transmittance from outside.
 struct DiffuseBase {
   TexturePtr reflectance;
-  float internalReflectance;  ///< of the coating, for diffuse light from within
-  float inverseEta2;          ///< (outside index over inside index)²
-  bool nonlinear;             ///< whether the colour saturates by the repeated scattering
+  float inverseEta2;  ///< (outside index over inside index)²
+  bool nonlinear;     ///< whether the colour saturates by the repeated scattering
 
-  Rgb colour(const Vec2& uv) const {
+  /// internalReflectance: of the coating, for diffuse light from within.
+  Rgb colour(const Vec2& uv, float internalReflectance) const {
     const Rgb diffuse = reflectance->eval(uv);
     const Rgb repeated = nonlinear ? Rgb(diffuse * internalReflectance) : grey(internalReflectance);
     return diffuse * inverseEta2 / (1.0f - repeated);

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include <fmt/format.h>
-
 namespace lobe {
 namespace {
 
@@ -90,33 +88,11 @@ Vec3d visibleGgx(const Vec3d& stretched, const Vec2& u) {
   return stretched + Vec3d(r * std::cos(phi), r * std::sin(phi), z);
 }
 
-double readAlpha(const Parameters& parameters, std::string_view name, double fallback) {
-  const double alpha = parameters.number(name, fallback);
-  if (!(alpha > 0.0 && alpha <= 10.0))
-    throw ParameterError(std::string(name), fmt::format("{} must be in (0, 10], not {}", name, alpha));
-  return std::max(alpha, 1e-4);
-}
-
 Vec3d unit(const Vec3& w) {
   return w.cast<double>().normalized();
 }
 
 }  // namespace
-
-Microfacet Microfacet::read(const Parameters& parameters) {
-  const std::string name = parameters.text("distribution", "beckmann");
-  if (name != "beckmann" && name != "ggx")
-    throw ParameterError("distribution", fmt::format("unknown distribution \"{}\"; known are beckmann, ggx", name));
-  parameters.flag("sample_visible", true);
-  const bool u = parameters.has("alpha_u");
-  const bool v = parameters.has("alpha_v");
-  if ((u || v) && parameters.has("alpha")) throw ParameterError("alpha", "give either alpha, or alpha_u and alpha_v");
-  if (u != v) throw ParameterError(u ? "alpha_u" : "alpha_v", "alpha_u and alpha_v must be given together");
-  const Kind kind = name == "ggx" ? Kind::ggx : Kind::beckmann;
-  if (u) return {kind, readAlpha(parameters, "alpha_u", 0.1), readAlpha(parameters, "alpha_v", 0.1)};
-  const double alpha = readAlpha(parameters, "alpha", 0.1);
-  return {kind, alpha, alpha};
-}
 
 double Microfacet::density(const Vec3d& m) const {
   if (m.z() <= 0.0) return 0.0;

@@ -8,7 +8,6 @@
 #include <optional>
 #include <string_view>
 
-#include "materials/parameters.h"
 #include "materials/vec.h"
 
 namespace lobe {
@@ -19,10 +18,6 @@ class Microfacet {
 
   /// alphaU and alphaV > 0: roughness along local x and y.
   Microfacet(Kind kind, double alphaU, double alphaV) : kind_(kind), alphaU_(alphaU), alphaV_(alphaV) {}
-
-  /// distribution (default beckmann) and alpha (default 0.1), or alpha_u with alpha_v; sample_visible is accepted, and
-  /// so always. ParameterError: unknown distribution, alpha not in (0, 10].
-  static Microfacet read(const Parameters& parameters);
 
   Kind kind() const { return kind_; }
   double alphaU() const { return alphaU_; }

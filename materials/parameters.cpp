@@ -36,6 +36,11 @@ bool Parameters::holdsText(std::string_view name) const {
   return it != entries_.end() && std::holds_alternative<std::string>(it->second.value);
 }
 
+bool Parameters::holdsTexture(std::string_view name) const {
+  const auto it = entries_.find(name);
+  return it != entries_.end() && std::holds_alternative<TexturePtr>(it->second.value);
+}
+
 bool Parameters::flag(std::string_view name, bool fallback) const {
   const Entry* entry = find(name);
   if (!entry) return fallback;

@@ -38,6 +38,8 @@ class Parameters {
   bool has(std::string_view name) const;
   /// Whether the parameter is there and is text, for what may be given by name or by number.
   bool holdsText(std::string_view name) const;
+  /// The same for what may be a number or a texture.
+  bool holdsTexture(std::string_view name) const;
 
   // Each returns the fallback when there is no such parameter and throws ParameterError when it has another type.
   bool flag(std::string_view name, bool fallback) const;

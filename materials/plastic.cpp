@@ -14,12 +14,13 @@ class Plastic final : public Bsdf {
   Plastic(double eta, DiffuseBase base, TexturePtr specular)
       : eta_(eta),
         meanTransmittance_(static_cast<float>(1.0 - fresnelDiffuse(eta))),
+        internalReflectance_(static_cast<float>(fresnelDiffuse(1.0 / eta))),
         base_(std::move(base)),
         specular_(std::move(specular)) {}
 
   Rgb eval(const Vec3& wo, const Vec3& wi, const Vec2& uv) const override {
     if (!(wo.z() > 0.0f && wi.z() > 0.0f)) return Rgb::Zero();
-    return base_.colour(uv) * (transmittance(wo) * transmittance(wi) * kInvPi);
+    return base_.colour(uv, internalReflectance_) * (transmittance(wo) * transmittance(wi) * kInvPi);
   }
 
   std::optional<BsdfSample> sample(const Vec3& wo, const Vec2& uv, float, const Vec2& u) const override {
@@ -63,11 +64,12 @@ class Plastic final : public Bsdf {
     return static_cast<float>(fresnelDielectric(wo.z(), eta_).reflectance) * specular_->eval(uv);
   }
   Rgb diffuseAlbedo(const Vec3& wo, const Vec2& uv) const {
-    return base_.colour(uv) * (transmittance(wo) * meanTransmittance_);
+    return base_.colour(uv, internalReflectance_) * (transmittance(wo) * meanTransmittance_);
   }
 
   double eta_;
   float meanTransmittance_;  ///< of diffuse light from outside
+  float internalReflectance_;
   DiffuseBase base_;
   TexturePtr specular_;
 };
@@ -76,8 +78,8 @@ class Plastic final : public Bsdf {
 
 BsdfPtr makePlastic(const Parameters& parameters) {
   const double eta = readRelativeIor(parameters, "polypropylene");
-  DiffuseBase base{parameters.texture("diffuse_reflectance", grey(0.5f)), static_cast<float>(fresnelDiffuse(1.0 / eta)),
-                   static_cast<float>(1.0 / (eta * eta)), parameters.flag("nonlinear", false)};
+  DiffuseBase base{parameters.texture("diffuse_reflectance", grey(0.5f)), static_cast<float>(1.0 / (eta * eta)),
+                   parameters.flag("nonlinear", false)};
   return std::make_shared<Plastic>(eta, std::move(base), parameters.texture("specular_reflectance", grey(1.0f)));
 }
 

@@ -124,4 +124,11 @@ float RoughTransmittance::operator()(float cosine) const {
   return (1.0f - w) * table_[at] + w * table_[at + 1];
 }
 
+VaryingTransmittance::VaryingTransmittance(const Roughness& roughness, double eta) {
+  for (const Microfacet& level : roughness.levels()) {
+    const double alpha = std::sqrt(level.alphaU() * level.alphaV());
+    levels_.emplace_back(Microfacet(level.kind(), alpha, alpha), eta);
+  }
+}
+
 }  // namespace lobe

@@ -8,6 +8,7 @@
 #include "materials/models.h"
 #include "materials/rough_interface.h"
 #include "materials/rough_transmittance.h"
+#include "materials/roughness.h"
 
 namespace lobe {
 namespace {
@@ -16,30 +17,33 @@ using Vec3d = Eigen::Vector3d;
 
 class RoughDielectric final : public Bsdf {
  public:
-  RoughDielectric(const Microfacet& microfacet, double eta, TexturePtr reflectance, TexturePtr transmittance)
-      : microfacet_(microfacet),
-        sides_{Side(microfacet, eta), Side(microfacet, 1.0 / eta)},
-        lobes_{std::make_shared<DielectricLobe>(microfacet, eta),
-               std::make_shared<DielectricLobe>(microfacet, 1.0 / eta)},
+  RoughDielectric(Roughness roughness, double eta, TexturePtr reflectance, TexturePtr transmittance)
+      : roughness_(std::move(roughness)),
+        sides_{Side(roughness_, eta), Side(roughness_, 1.0 / eta)},
         reflectance_(std::move(reflectance)),
-        transmittance_(std::move(transmittance)) {}
+        transmittance_(std::move(transmittance)) {
+    for (const Side& side : sides_)
+      for (const Microfacet& level : roughness_.levels())
+        lobes_.push_back(std::make_shared<DielectricLobe>(level, side.eta));
+  }
 
   Rgb eval(const Vec3& wo, const Vec3& wi, const Vec2& uv) const override {
-    const FacetScattering s = scattering(wo, wi);
+    const FacetScattering s = scattering(roughness_.at(uv).microfacet, wo, wi);
     return s.value > 0.0 ? value(s, sharesAt(wo, s.cosHalf, uv)) : Rgb::Zero();
   }
 
   std::optional<BsdfSample> sample(const Vec3& wo, const Vec2& uv, float choice, const Vec2& u) const override {
     if (wo.z() == 0.0f) return std::nullopt;
     const double eta = sideOf(wo).eta;
+    const Microfacet microfacet = roughness_.at(uv).microfacet;
     const Vec3d o = upright(wo, wo).cast<double>().normalized();
-    const Vec3d m = microfacet_.sampleVisible(o, u);
+    const Vec3d m = microfacet.sampleVisible(o, u);
     const double c = o.dot(m);
     const bool reflects = choice < sharesAt(wo, c, uv).probability(true);
     const Vec3d i =
         reflects ? Vec3d(2.0 * c * m - o) : Vec3d((c / eta - fresnelDielectric(c, eta).cosTransmitted) * m - o / eta);
     const Vec3 wi = upright(i.normalized().cast<float>(), wo);
-    const FacetScattering s = scattering(wo, wi);
+    const FacetScattering s = scattering(microfacet, wo, wi);
     if (s.reflects != reflects) return std::nullopt;
     const Shares shares = sharesAt(wo, s.cosHalf, uv);
     const float drawn = density(s, shares);
@@ -48,7 +52,7 @@ class RoughDielectric final : public Bsdf {
   }
 
   float pdf(const Vec3& wo, const Vec3& wi, const Vec2& uv) const override {
-    const FacetScattering s = scattering(wo, wi);
+    const FacetScattering s = scattering(roughness_.at(uv).microfacet, wo, wi);
     return s.density > 0.0 ? density(s, sharesAt(wo, s.cosHalf, uv)) : 0.0f;
   }
 
@@ -57,8 +61,8 @@ class RoughDielectric final : public Bsdf {
   LobeMixture mixture(const Vec3& wo, const Vec2& uv) const override {
     LobeMixture result;
     if (wo.z() == 0.0f) return result;
-    result.glossy[0] = {wo.z() > 0.0f ? 0 : 1, luminance(reflectance_->eval(uv))};
-    result.glossyCount = 1;
+    const int firstLobe = wo.z() > 0.0f ? 0 : static_cast<int>(roughness_.levels().size());
+    addLevels(result, firstLobe, roughness_.at(uv), luminance(reflectance_->eval(uv)));
     result.transmittedShare = meanShares(wo, uv).probability(false);
     return result;
   }
@@ -74,16 +78,10 @@ class RoughDielectric final : public Bsdf {
  private:
   /// The interface as seen from one side.
   struct Side {
-    Side(const Microfacet& microfacet, double relative)
-        : eta(relative), transmittance(isotropic(microfacet), relative) {}
-
-    static Microfacet isotropic(const Microfacet& m) {
-      const double alpha = std::sqrt(m.alphaU() * m.alphaV());
-      return {m.kind(), alpha, alpha};
-    }
+    Side(const Roughness& roughness, double relative) : eta(relative), transmittance(roughness, relative) {}
 
     double eta;  ///< index of the far side over that of this one
-    RoughTransmittance transmittance;
+    VaryingTransmittance transmittance;
   };
 
   /// What the interface does with light that meets a facet.
@@ -100,8 +98,8 @@ class RoughDielectric final : public Bsdf {
   /// w in the frame in which wo is above the surface; and back.
   static Vec3 upright(const Vec3& w, const Vec3& wo) { return wo.z() > 0.0f ? w : Vec3(w.x(), w.y(), -w.z()); }
 
-  FacetScattering scattering(const Vec3& wo, const Vec3& wi) const {
-    return scatterAtFacets(microfacet_, sideOf(wo).eta, upright(wo, wo), upright(wi, wo));
+  FacetScattering scattering(const Microfacet& microfacet, const Vec3& wo, const Vec3& wi) const {
+    return scatterAtFacets(microfacet, sideOf(wo).eta, upright(wo, wo), upright(wi, wo));
   }
   static Rgb value(const FacetScattering& s, const Shares& shares) {
     return static_cast<float>(s.value) * (s.reflects ? shares.reflected : shares.refracted);
@@ -118,12 +116,12 @@ class RoughDielectric final : public Bsdf {
     return shares(fresnelDielectric(cosHalf, sideOf(wo).eta).reflectance, uv);
   }
   Shares meanShares(const Vec3& wo, const Vec2& uv) const {
-    return shares(1.0f - sideOf(wo).transmittance(std::abs(wo.z())), uv);
+    return shares(1.0f - sideOf(wo).transmittance(roughness_.at(uv), std::abs(wo.z())), uv);
   }
 
-  Microfacet microfacet_;
-  std::array<Side, 2> sides_;  ///< from outside, from inside
-  std::array<LobePtr, 2> lobes_;
+  Roughness roughness_;
+  std::array<Side, 2> sides_;   ///< from outside, from inside
+  std::vector<LobePtr> lobes_;  ///< one for each level, from outside; then the same from inside
   TexturePtr reflectance_;
   TexturePtr transmittance_;
 };
@@ -134,7 +132,7 @@ BsdfPtr makeRoughDielectric(const Parameters& parameters) {
   const double eta = readRelativeIor(parameters, "bk7");
   // Without a difference every normal lets light straight through: there is no half vector.
   if (std::abs(eta - 1.0) < 1e-6) throw ParameterError("int_ior", "int_ior and ext_ior must differ");
-  return std::make_shared<RoughDielectric>(Microfacet::read(parameters), eta,
+  return std::make_shared<RoughDielectric>(Roughness::read(parameters), eta,
                                            parameters.texture("specular_reflectance", grey(1.0f)),
                                            parameters.texture("specular_transmittance", grey(1.0f)));
 }

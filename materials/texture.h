@@ -7,6 +7,11 @@
 
 namespace lobe {
 
+/// Bounds of a luminance.
+struct TextureRange {
+  float smallest, largest;
+};
+
 class Texture {
  public:
   virtual ~Texture() = default;
@@ -15,6 +20,8 @@ class Texture {
   virtual Rgb eval(const Vec2& uv) const = 0;
   /// The mean colour over one period, used for decisions that must not depend on where the surface is hit.
   virtual Rgb mean() const = 0;
+  /// Bounds of the colour's luminance over all uv, tight but for coloured scales of colours; equal for a constant.
+  virtual TextureRange range() const = 0;
 };
 
 using TexturePtr = std::shared_ptr<const Texture>;

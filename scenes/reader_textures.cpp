@@ -1,5 +1,7 @@
 #include "scenes/reader_textures.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "materials/bitmap.h"
@@ -17,6 +19,13 @@ class ScaledTexture final : public Texture {
   ScaledTexture(TexturePtr nested, const Rgb& scale) : nested_(std::move(nested)), scale_(scale) {}
   Rgb eval(const Vec2& uv) const override { return nested_->eval(uv) * scale_; }
   Rgb mean() const override { return nested_->mean() * scale_; }
+  TextureRange range() const override {
+    const TextureRange nested = nested_->range();
+    const float low = scale_.minCoeff(), high = scale_.maxCoeff();
+    const auto [smallest, largest] =
+        std::minmax({low * nested.smallest, low * nested.largest, high * nested.smallest, high * nested.largest});
+    return {smallest, largest};
+  }
 
  private:
   TexturePtr nested_;

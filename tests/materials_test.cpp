@@ -21,6 +21,7 @@ class Waves final : public Texture {
     return grey(0.05f * std::sin(4.0f * uv.x()) + 0.03f * std::cos(3.0f * uv.y()));
   }
   Rgb mean() const override { return Rgb::Zero(); }
+  TextureRange range() const override { return {-0.08f, 0.08f}; }
 };
 
 std::string messageOf(const std::string& type,
@@ -79,7 +80,7 @@ TEST_CASE("materials: wrong parameters are refused with what is known") {
   CHECK_THAT(messageOf("roughconductor", {{"alpha_u", 0.1}}), Contains("together"));
   CHECK_THAT(messageOf("roughconductor", {{"alpha", 0.1}, {"alpha_u", 0.1}, {"alpha_v", 0.1}}), Contains("either"));
   CHECK_THAT(messageOf("roughconductor", {{"material", std::string("Unobtainium")}}), Contains("Au") && Contains("Cu"));
-  CHECK_THAT(messageOf("roughconductor", {{"alpha", constantTexture(grey(0.1f))}}), Contains("texture"));
+  CHECK_THAT(messageOf("roughconductor", {{"alpha", grey(0.1f)}}), Contains("number"));
   CHECK_THAT(messageOf("roughplastic", {{"int_ior", std::string("jelly")}}), Contains("bk7") && Contains("water"));
   CHECK_THAT(messageOf("roughplastic", {{"int_ior", -1.0}}), Contains("positive"));
   CHECK_THAT(messageOf("roughplastic", {{"alpha_u", 0.1}, {"alpha_v", 0.2}}), Contains("isotropic"));

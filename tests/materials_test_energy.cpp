@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "materials/checkerboard.h"
 #include "materials/fresnel.h"
 #include "materials/microfacet.h"
 #include "materials/rough_transmittance.h"
@@ -42,6 +43,9 @@ std::vector<Named> smoothModels() {
                                                    {"alpha_u", alpha},
                                                    {"alpha_v", 1.4 * alpha},
                                                    {"specular_transmittance", Rgb(0.3f, 0.9f, 0.6f)}})});
+  const TexturePtr varying = makeCheckerboard(constantTexture(grey(0.13f)), constantTexture(grey(0.6f)));
+  for (const char* type : {"roughconductor", "roughplastic", "roughdielectric"})
+    models.push_back({std::string("textured ") + type, bsdfOf(type, {{"alpha", varying}})});
   const BsdfPtr front = models[3].bsdf;
   const BsdfPtr back = models[4].bsdf;
   models.push_back({"twosided", bsdfOf("twosided", {}, {front, back})});
