@@ -235,6 +235,28 @@ TEST_CASE("unbiased: a glossy plate under a bright spot reflects what the integr
   CHECK_FALSE(agree(wrong, exactly(expected, wrong.size())));
 }
 
+TEST_CASE("unbiased: path, guided and product agree through frosted glass on metal of varying roughness", "[slow]") {
+  const lobe::test::Folder folder;
+  std::ofstream(folder / "glass.xml") << R"(<scene version="3.0.0">
+    <sensor type="perspective"><float name="fov" value="35"/>
+      <transform name="to_world"><lookat origin="0, -6, 3" target="0, 0, 0.6" up="0, 0, 1"/></transform></sensor>
+    <shape type="rectangle"><transform name="to_world"><scale value="4"/></transform>
+      <bsdf type="roughconductor"><string name="distribution" value="ggx"/>
+        <texture type="checkerboard" name="alpha"><float name="uscale" value="6"/><float name="vscale" value="6"/>
+          <rgb name="color0" value="0.2, 0.2, 0.2"/><rgb name="color1" value="0.55, 0.55, 0.55"/></texture></bsdf></shape>
+    <shape type="sphere"><point name="center" x="0" y="0" z="1"/>
+      <bsdf type="roughdielectric"><string name="distribution" value="ggx"/><float name="alpha" value="0.25"/></bsdf></shape>
+    <shape type="sphere"><point name="center" x="3" y="1" z="4"/>
+      <emitter type="area"><rgb name="radiance" value="4, 4, 3"/></emitter></shape>
+    <emitter type="constant"><rgb name="radiance" value="0.2, 0.25, 0.3"/></emitter></scene>)";
+  const Studio studio(readScene(folder / "glass.xml"), 30, 20);
+  REQUIRE(studio.illumination().records().size() > 10);
+  const auto path = blocks(studio.render(studio.path(), 1024, 1), 5);
+  CHECK(agree(path, blocks(studio.render(studio.guided(), 512, 2), 5)));
+  CHECK(agree(path, blocks(studio.render(studio.product(), 512, 3), 5)));
+  CHECK_FALSE(agree(path, blocks(studio.render(WrongIntegrator(studio), 512, 4), 5)));
+}
+
 TEST_CASE("unbiased: training and rendering give the same bytes on any number of threads", "[slow]") {
   const auto renderWith = [](std::size_t threads) {
     const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism, threads);
