@@ -6,10 +6,10 @@
 
 namespace lobe {
 
-TriangleMesh readMesh(const MeshSource& source, const MeshOptions& options) {
-  if (source.type == "obj") return readObj(source.path, options);
-  if (source.type == "ply") return readPly(source.path, options);
-  return readSerialized(source.path, source.index, options);
+std::vector<TriangleMesh> readMeshes(const MeshSource& source, const MeshOptions& options) {
+  if (source.type == "obj") return readObjByMaterial(source.path, options, source.materials);
+  if (source.type == "ply") return {readPly(source.path, options)};
+  return {readSerialized(source.path, source.index, options)};
 }
 
 }  // namespace lobe

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "scenes/mesh_options.h"
 #include "scenes/scene.h"
@@ -12,10 +13,12 @@ namespace lobe {
 struct MeshSource {
   std::string type;  ///< obj, ply or serialized
   std::filesystem::path path;
-  int index = 0;  ///< which of the meshes in a serialized file
+  int index = 0;                       ///< which of the meshes in a serialized file
+  std::vector<std::string> materials;  ///< of an OBJ, to be told apart
 };
 
-/// Reads the mesh into the world. Throws std::runtime_error that names the file. Safe to call from several threads.
-TriangleMesh readMesh(const MeshSource& source, const MeshOptions& options);
+/// Reads the mesh into the world: one for each of the materials, of its faces (empty when there are none), then one of
+/// the rest. Throws std::runtime_error that names the file. Safe to call from several threads.
+std::vector<TriangleMesh> readMeshes(const MeshSource& source, const MeshOptions& options);
 
 }  // namespace lobe

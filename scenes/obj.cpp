@@ -29,6 +29,8 @@ struct ObjData {
   std::vector<Vec3> normals;
   std::vector<Corner> corners;           ///< of all faces, one after the other
   std::vector<std::size_t> faceEnds{0};  ///< face i has the corners from faceEnds[i] to before faceEnds[i + 1]
+  std::vector<int> faceParts;  ///< of each face: the index of its material among those asked for, or their count
+  int part = 0;                ///< of the faces to come
 };
 
 // ---- What the library lets pass in silence: it reads 0 for any number it cannot make out.
@@ -76,37 +78,29 @@ int resolve(int index, std::size_t count) {
   return resolved >= 0 ? static_cast<int>(resolved) : kInvalid;
 }
 
+struct ObjParser {
+  ObjData data;
+  const std::vector<std::string>& materials;
+};
+
+ObjData& dataOf(void* user) {
+  return static_cast<ObjParser*>(user)->data;
+}
+
+void takeMaterial(void* user, const char* name, int) {
+  ObjParser& parser = *static_cast<ObjParser*>(user);
+  parser.data.part = static_cast<int>(std::ranges::find(parser.materials, name) - parser.materials.begin());
+}
+
 void takeFace(void* user, tinyobj::index_t* indices, int count) {
   if (count < 3) return;
-  ObjData& data = *static_cast<ObjData*>(user);
+  ObjData& data = dataOf(user);
   for (int i = 0; i < count; ++i)
     data.corners.push_back({resolve(indices[i].vertex_index, data.positions.size()),
                             resolve(indices[i].texcoord_index, data.uvs.size()),
                             resolve(indices[i].normal_index, data.normals.size())});
   data.faceEnds.push_back(data.corners.size());
-}
-
-ObjData parseObj(std::string text) {
-  requireSoundLines(text);
-  tinyobj::callback_t callback;
-  callback.vertex_cb = [](void* user, float x, float y, float z, float) {
-    static_cast<ObjData*>(user)->positions.emplace_back(x, y, z);
-  };
-  callback.normal_cb = [](void* user, float x, float y, float z) {
-    static_cast<ObjData*>(user)->normals.emplace_back(x, y, z);
-  };
-  // Textures have v downwards, the file upwards.
-  callback.texcoord_cb = [](void* user, float u, float v, float) {
-    static_cast<ObjData*>(user)->uvs.emplace_back(u, 1.0f - v);
-  };
-  callback.index_cb = takeFace;
-
-  ObjData data;
-  std::istringstream stream(std::move(text));
-  std::string error;
-  if (!tinyobj::LoadObjWithCallback(stream, callback, &data, nullptr, nullptr, &error))
-    throw std::runtime_error(error.substr(0, error.find('\n')));
-  return data;
+  data.faceParts.push_back(data.part);
 }
 
 void requireIndicesInRange(const ObjData& data) {
@@ -120,6 +114,39 @@ void requireIndicesInRange(const ObjData& data) {
     check(corner.uv, data.uvs.size(), true, "texture coordinate");
     check(corner.normal, data.normals.size(), true, "normal");
   }
+}
+
+/// Drops what not all corners have (normals), or none (texture coordinates; the others get the origin).
+void dropUnused(ObjData& data, bool faceNormals) {
+  const bool allNormals = std::ranges::none_of(data.corners, [](const Corner& c) { return c.normal == kNone; });
+  const bool anyUvs = std::ranges::any_of(data.corners, [](const Corner& c) { return c.uv != kNone; });
+  if (faceNormals || !allNormals) data.normals.clear();
+  if (!anyUvs) data.uvs.clear();
+  if (data.normals.empty())
+    for (Corner& corner : data.corners) corner.normal = kNone;
+}
+
+ObjData parseObj(std::string text, bool faceNormals, const std::vector<std::string>& materials) {
+  requireSoundLines(text);
+  tinyobj::callback_t callback;
+  callback.vertex_cb = [](void* user, float x, float y, float z, float) {
+    dataOf(user).positions.emplace_back(x, y, z);
+  };
+  callback.normal_cb = [](void* user, float x, float y, float z) { dataOf(user).normals.emplace_back(x, y, z); };
+  // Textures have v downwards, the file upwards.
+  callback.texcoord_cb = [](void* user, float u, float v, float) { dataOf(user).uvs.emplace_back(u, 1.0f - v); };
+  callback.index_cb = takeFace;
+  callback.usemtl_cb = takeMaterial;
+
+  ObjParser parser{{}, materials};
+  parser.data.part = static_cast<int>(materials.size());
+  std::istringstream stream(std::move(text));
+  std::string error;
+  if (!tinyobj::LoadObjWithCallback(stream, callback, &parser, nullptr, nullptr, &error))
+    throw std::runtime_error(error.substr(0, error.find('\n')));
+  requireIndicesInRange(parser.data);
+  dropUnused(parser.data, faceNormals);
+  return std::move(parser.data);
 }
 
 // ---- From corners to vertices
@@ -165,24 +192,12 @@ void addFace(const ObjData& data, std::size_t begin, std::size_t end, VertexTabl
   for (const auto& [i, j, k] : triangulate(polygon)) mesh.triangles.push_back({ids[i], ids[j], ids[k]});
 }
 
-/// Drops what not all corners have (normals), or none (texture coordinates; the others get the origin).
-void dropUnused(ObjData& data, bool faceNormals) {
-  const bool allNormals = std::ranges::none_of(data.corners, [](const Corner& c) { return c.normal == kNone; });
-  const bool anyUvs = std::ranges::any_of(data.corners, [](const Corner& c) { return c.uv != kNone; });
-  if (faceNormals || !allNormals) data.normals.clear();
-  if (!anyUvs) data.uvs.clear();
-  if (data.normals.empty())
-    for (Corner& corner : data.corners) corner.normal = kNone;
-}
-
-TriangleMesh buildMesh(ObjData data, bool faceNormals) {
-  requireIndicesInRange(data);
-  dropUnused(data, faceNormals);
+TriangleMesh buildMesh(const ObjData& data, int part) {
   TriangleMesh mesh;
   mesh.triangles.reserve(data.corners.size() / 3);
   VertexTable vertices(data.positions.size());
   for (std::size_t face = 0; face + 1 < data.faceEnds.size(); ++face)
-    addFace(data, data.faceEnds[face], data.faceEnds[face + 1], vertices, mesh);
+    if (data.faceParts[face] == part) addFace(data, data.faceEnds[face], data.faceEnds[face + 1], vertices, mesh);
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     const Corner& corner = vertices.corner(i);
     mesh.positions.push_back(data.positions[corner.position]);
@@ -195,8 +210,23 @@ TriangleMesh buildMesh(ObjData data, bool faceNormals) {
 }  // namespace
 
 TriangleMesh readObj(const std::filesystem::path& path, const MeshOptions& options) {
-  return readMeshFile(path, [&options](std::string text) {
-    return toWorldMesh(buildMesh(parseObj(std::move(text)), options.faceNormals), options);
+  return readObjByMaterial(path, options, {}).front();
+}
+
+std::vector<TriangleMesh> readObjByMaterial(const std::filesystem::path& path, const MeshOptions& options,
+                                            const std::vector<std::string>& materials) {
+  return naming(path, [&] {
+    const ObjData data = parseObj(readBytes(path), options.faceNormals, materials);
+    std::vector<TriangleMesh> meshes;
+    for (std::size_t part = 0; part <= materials.size(); ++part) {
+      TriangleMesh mesh = buildMesh(data, static_cast<int>(part));
+      // With one mesh for the file, an empty one is a fault.
+      if (mesh.triangles.empty() && !materials.empty())
+        meshes.emplace_back();
+      else
+        meshes.push_back(toWorldMesh(std::move(mesh), options));
+    }
+    return meshes;
   });
 }
 

@@ -2,6 +2,8 @@
 // Wavefront OBJ files.
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "scenes/mesh_options.h"
 #include "scenes/scene.h"
@@ -14,5 +16,10 @@ namespace lobe {
 /// angle, as Mitsuba does. The front is where the file's normals point or, without any, where the triangles are
 /// counter-clockwise in world space. Throws std::runtime_error that names the file. Safe to call from several threads.
 TriangleMesh readObj(const std::filesystem::path& path, const MeshOptions& options);
+
+/// The same with a mesh for each of the materials, of the faces that follow its `usemtl`, and a last one of all other
+/// faces. A mesh is empty where the file has no such faces.
+std::vector<TriangleMesh> readObjByMaterial(const std::filesystem::path& path, const MeshOptions& options,
+                                            const std::vector<std::string>& materials);
 
 }  // namespace lobe

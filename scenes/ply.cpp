@@ -292,7 +292,7 @@ TriangleMesh parsePly(std::string_view file) {
 }  // namespace
 
 TriangleMesh readPly(const std::filesystem::path& path, const MeshOptions& options) {
-  return readMeshFile(path, [&options](const std::string& file) { return toWorldMesh(parsePly(file), options); });
+  return naming(path, [&] { return toWorldMesh(parsePly(readBytes(path)), options); });
 }
 
 }  // namespace lobe

@@ -2,6 +2,7 @@
 // Reads Mitsuba scene files (0.4 to 3.x spellings) into plain data.
 
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -24,6 +25,8 @@ struct ReadOptions {
   bool lenient = false;
   /// false: materials only, no meshes or environment (the fitter's need).
   bool geometry = true;
+  /// Told the share of the meshes just read; from any thread.
+  std::function<void(double)> onProgress = {};
 };
 
 /// Throws SceneError. Meshes are read in parallel with oneTBB.

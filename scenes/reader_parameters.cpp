@@ -75,7 +75,7 @@ Parameters readParameters(ReadContext& context, pugi::xml_node node, const std::
     }
     const bool isReference = std::string_view(child.name()) == "ref";
     const pugi::xml_node target = isReference ? resolveReference(context, child) : child;
-    if (onChild(target, normalisedName(child.attribute("name").value()), parameters)) continue;
+    if (onChild(target, child.attribute("name").value(), parameters)) continue;
     context.unsupported(child, fmt::format("<{}> in {}", target.name(), describe(node)),
                         fmt::format("unknown element <{}> in {}; known are {}{}{}", target.name(), describe(node),
                                     kValueElements, knownChildren.empty() ? "" : ", ", knownChildren),

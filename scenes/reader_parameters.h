@@ -11,7 +11,7 @@
 namespace lobe {
 
 /// Told of each child that is no plain value, with references already followed, and the name that its parent knows it
-/// by (may be empty). Returns whether such a child has its place here.
+/// by, as it is written (may be empty). Returns whether such a child has its place here.
 using ChildHandler = std::function<bool(pugi::xml_node child, const std::string& name, Parameters& parameters)>;
 
 /// The plain values among the children, names in snake_case; points and vectors are colours, integers are numbers. What

@@ -105,14 +105,26 @@ void ShapeReader::addTo(int group, pugi::xml_node node) {
 
 void ShapeReader::addShape(int group, pugi::xml_node node, const std::string& type) {
   Parts parts;
-  const Parameters parameters =
-      readParameters(context_, node, "bsdf, ref, emitter",
-                     [&](pugi::xml_node child, const std::string&, Parameters&) { return take(child, parts); });
+  const auto onChild = [&](pugi::xml_node child, const std::string& name, Parameters&) {
+    return take(child, name, type, parts);
+  };
+  const Parameters parameters = readParameters(context_, node, "bsdf, ref, emitter", onChild);
   if (group != kTop && parts.emitter) context_.file.fail(node, "a shape in a shapegroup cannot emit light");
-  Shape shape = makeFrom(context_, node, parameters, [&](const Parameters& p) { return make(group, node, type, p); });
-  shape.material = parts.bsdf ? materials_.use(parts.bsdf) : materials_.useDefault(parts.emitter.has_value());
-  shape.emitter = std::move(parts.emitter);
-  shapesOf(group).push_back(std::move(shape));
+  const std::string id = node.attribute("id").value();
+  if (isMesh(type)) {
+    Mesh mesh = makeFrom(context_, node, parameters,
+                         [&](const Parameters& p) { return makeMesh(type, p, readOptions(type, p)); });
+    const std::string file = parameters.text("filename", "");
+    addMesh(group, std::move(mesh), id.empty() ? file : id, parts);
+    return;
+  }
+  Geometry geometry = makeFrom(context_, node, parameters,
+                               [&](const Parameters& p) { return makePrimitive(type, p, readOptions(type, p)); });
+  shapesOf(group).push_back({id.empty() ? type : id, std::move(geometry), materialOf(parts), parts.emitter});
+}
+
+int ShapeReader::materialOf(const Parts& parts) {
+  return parts.bsdf ? materials_.use(parts.bsdf) : materials_.useDefault(parts.emitter.has_value());
 }
 
 void ShapeReader::addInstance(pugi::xml_node node) {
@@ -152,11 +164,10 @@ void ShapeReader::readGroup(pugi::xml_node node, int group) {
   checkUnused(context_, node, parameters);
 }
 
-bool ShapeReader::take(pugi::xml_node child, Parts& parts) {
+bool ShapeReader::take(pugi::xml_node child, const std::string& name, const std::string& type, Parts& parts) {
   const std::string_view tag = elementName(child);
   if (tag == "bsdf") {
-    if (parts.bsdf) context_.file.fail(child, "a second bsdf for the same shape");
-    parts.bsdf = child;
+    takeBsdf(child, name, type, parts);
   } else if (tag == "emitter") {
     takeEmitter(child, parts);
   } else if (tag == "medium") {
@@ -165,6 +176,16 @@ bool ShapeReader::take(pugi::xml_node child, Parts& parts) {
     return false;
   }
   return true;
+}
+
+/// The name of an OBJ's bsdf is that of the material it is for; "bsdf" is what Mitsuba 3 calls the only one.
+void ShapeReader::takeBsdf(pugi::xml_node child, const std::string& name, const std::string& type, Parts& parts) {
+  if (type == "obj" && !name.empty() && name != "bsdf") {
+    parts.named.emplace_back(name, child);
+    return;
+  }
+  if (parts.bsdf) context_.file.fail(child, "a second bsdf for the same shape");
+  parts.bsdf = child;
 }
 
 void ShapeReader::takeEmitter(pugi::xml_node node, Parts& parts) {
@@ -182,50 +203,68 @@ void ShapeReader::takeEmitter(pugi::xml_node node, Parts& parts) {
                            [](const Parameters& p) { return AreaEmitter{p.texture("radiance", grey(1.0f))}; });
 }
 
-Shape ShapeReader::make(int group, pugi::xml_node node, const std::string& type, const Parameters& parameters) {
-  Shape shape;
-  shape.name = node.attribute("id").value();
-  const MeshOptions options = readOptions(type, parameters);
-  if (isMesh(type))
-    addMesh(group, type, parameters, options, shape);
-  else
-    shape.geometry = makePrimitive(type, parameters, options);
-  if (shape.name.empty()) shape.name = type;
-  return shape;
+ShapeReader::Mesh ShapeReader::makeMesh(const std::string& type, const Parameters& parameters,
+                                        const MeshOptions& options) {
+  const std::filesystem::path path = context_.file.resolve(requiredText(parameters, "filename"));
+  const int index = type == "serialized" ? readIndex(parameters) : 0;
+  // They concern normals that the file lacks and vertices it repeats: ours are smooth, and what is equal is merged.
+  parameters.number("max_smooth_angle", 0);
+  parameters.flag("collapse", false);
+  for (const char* name : {"max_smooth_angle", "collapse"})
+    if (parameters.has(name)) context_.note(fmt::format("shape \"{}\": no effect of {}", type, name));
+  return {{}, parameters.location("filename"), {type, path, index, {}}, options, ""};
 }
 
-void ShapeReader::addMesh(int group, const std::string& type, const Parameters& parameters, const MeshOptions& options,
-                          Shape& shape) {
-  const std::string filename = requiredText(parameters, "filename");
-  if (shape.name.empty()) shape.name = filename;
-  const MeshSource source{type, context_.file.resolve(filename), type == "serialized" ? readIndex(parameters) : 0};
-  meshes_.push_back({{group, shapesOf(group).size()}, parameters.location("filename"), source, options, ""});
+void ShapeReader::addMesh(int group, Mesh mesh, const std::string& name, const Parts& parts) {
+  std::vector<Shape>& shapes = shapesOf(group);
+  const auto add = [&](const std::string& part, int material) {
+    mesh.shapes.push_back({group, shapes.size()});
+    shapes.push_back({part, TriangleMesh(), material, parts.emitter});
+  };
+  for (const auto& [material, bsdf] : parts.named) {
+    mesh.source.materials.push_back(material);
+    add(name + ":" + material, materials_.use(bsdf));
+  }
+  add(name, materialOf(parts));
+  meshes_.push_back(std::move(mesh));
 }
 
 void ShapeReader::readMeshes() {
   tbb::parallel_for(std::size_t{0}, meshes_.size(), [this](std::size_t i) {
-    Mesh& mesh = meshes_[i];
-    try {
-      shapesOf(mesh.shape.group)[mesh.shape.index].geometry = readMesh(mesh.source, mesh.options);
-    } catch (const std::exception& error) {
-      mesh.fault = error.what();
-    }
+    read(meshes_[i]);
+    if (context_.options.onProgress) context_.options.onProgress(1.0 / static_cast<double>(meshes_.size()));
   });
-  reportFaults();
+  for (const Mesh& mesh : meshes_) reportFault(mesh);
+  // From the back, as places are indices.
+  for (auto mesh = meshes_.rbegin(); mesh != meshes_.rend(); ++mesh) dropEmpty(*mesh);
 }
 
-void ShapeReader::reportFaults() {
-  std::vector<Place> missing;
-  for (const Mesh& mesh : meshes_) {
-    if (mesh.fault.empty()) continue;
-    const std::string message = fmt::format("shape \"{}\": {}", mesh.source.type, mesh.fault);
-    if (std::filesystem::exists(mesh.source.path)) context_.file.fail(mesh.location, message);
-    context_.unsupported(mesh.location, "missing mesh " + mesh.source.path.string(), message, "the shape is left out");
-    missing.push_back(mesh.shape);
+void ShapeReader::read(Mesh& mesh) {
+  try {
+    std::vector<TriangleMesh> parts = lobe::readMeshes(mesh.source, mesh.options);
+    for (std::size_t i = 0; i < parts.size(); ++i)
+      shapesOf(mesh.shapes[i].group)[mesh.shapes[i].index].geometry = std::move(parts[i]);
+  } catch (const std::exception& error) {
+    mesh.fault = error.what();
   }
-  for (auto place = missing.rbegin(); place != missing.rend(); ++place) {
-    std::vector<Shape>& shapes = shapesOf(place->group);
-    shapes.erase(shapes.begin() + static_cast<std::ptrdiff_t>(place->index));
+}
+
+void ShapeReader::reportFault(const Mesh& mesh) {
+  if (mesh.fault.empty()) return;
+  const std::string message = fmt::format("shape \"{}\": {}", mesh.source.type, mesh.fault);
+  if (std::filesystem::exists(mesh.source.path)) context_.file.fail(mesh.location, message);
+  context_.unsupported(mesh.location, "missing mesh " + mesh.source.path.string(), message, "the shape is left out");
+}
+
+void ShapeReader::dropEmpty(const Mesh& mesh) {
+  for (std::size_t i = mesh.shapes.size(); i-- > 0;) {
+    std::vector<Shape>& shapes = shapesOf(mesh.shapes[i].group);
+    const auto shape = shapes.begin() + static_cast<std::ptrdiff_t>(mesh.shapes[i].index);
+    if (!std::get<TriangleMesh>(shape->geometry).triangles.empty()) continue;
+    if (mesh.fault.empty() && i < mesh.source.materials.size())
+      context_.note(fmt::format("{}: no face is of material \"{}\"", mesh.source.path.filename().string(),
+                                mesh.source.materials[i]));
+    shapes.erase(shape);
   }
 }
 

@@ -22,6 +22,7 @@ class ShapeReader {
  private:
   struct Parts {
     pugi::xml_node bsdf;
+    std::vector<std::pair<std::string, pugi::xml_node>> named;  ///< of an OBJ's materials
     std::optional<AreaEmitter> emitter;
   };
   /// Where a shape is kept: at the top of the scene (group −1) or in a group.
@@ -30,7 +31,7 @@ class ShapeReader {
     std::size_t index;
   };
   struct Mesh {
-    Place shape;
+    std::vector<Place> shapes;  ///< one for each of the source's materials, then that of the rest
     std::ptrdiff_t location;
     MeshSource source;
     MeshOptions options;
@@ -42,15 +43,18 @@ class ShapeReader {
   void addInstance(pugi::xml_node node);
   int groupOf(pugi::xml_node node);
   void readGroup(pugi::xml_node node, int group);
-  bool take(pugi::xml_node child, Parts& parts);
+  bool take(pugi::xml_node child, const std::string& name, const std::string& type, Parts& parts);
+  void takeBsdf(pugi::xml_node child, const std::string& name, const std::string& type, Parts& parts);
   void takeEmitter(pugi::xml_node node, Parts& parts);
-  Shape make(int group, pugi::xml_node node, const std::string& type, const Parameters& parameters);
-  void addMesh(int group, const std::string& type, const Parameters& parameters, const MeshOptions& options,
-               Shape& shape);
+  Mesh makeMesh(const std::string& type, const Parameters& parameters, const MeshOptions& options);
+  void addMesh(int group, Mesh mesh, const std::string& name, const Parts& parts);
+  int materialOf(const Parts& parts);
   std::vector<Shape>& shapesOf(int group) {
     return group < 0 ? context_.scene.shapes : context_.scene.groups[static_cast<std::size_t>(group)].shapes;
   }
-  void reportFaults();
+  void read(Mesh& mesh);
+  void reportFault(const Mesh& mesh);
+  void dropEmpty(const Mesh& mesh);
 
   ReadContext& context_;
   TextureReader& textures_;

@@ -7,6 +7,7 @@
 #include "materials/bitmap.h"
 #include "materials/checkerboard.h"
 #include "scenes/reader_parameters.h"
+#include "scenes/values.h"
 
 namespace lobe {
 namespace {
@@ -104,7 +105,7 @@ TexturePtr TextureReader::read(pugi::xml_node node, Encoded encoded) {
 
 bool TextureReader::take(pugi::xml_node child, const std::string& name, Parameters& parameters, Encoded encoded) {
   if (elementName(child) != "texture") return false;
-  const std::string key = name.empty() ? "texture" : name;
+  const std::string key = name.empty() ? "texture" : normalisedName(name);
   if (parameters.has(key)) context_.file.fail(child, fmt::format("the parameter \"{}\" is given twice", key));
   parameters.set(key, read(child, encoded), SceneFile::location(child));
   return true;

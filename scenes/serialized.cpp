@@ -4,12 +4,12 @@
 #include <cstring>
 #include <fstream>
 #include <limits>
-#include <new>
 #include <stdexcept>
 
 #include <fmt/format.h>
 #include <zlib.h>
 
+#include "scenes/mesh_file.h"
 #include "scenes/world_mesh.h"
 
 namespace lobe {
@@ -194,13 +194,7 @@ TriangleMesh readFrom(const std::filesystem::path& path, int index, MeshOptions 
 }  // namespace
 
 TriangleMesh readSerialized(const std::filesystem::path& path, int index, const MeshOptions& options) {
-  try {
-    return readFrom(path, index, options);
-  } catch (const std::bad_alloc&) {
-    throw std::runtime_error(fmt::format("{}: mesh {}: too large for the memory there is", path.string(), index));
-  } catch (const std::exception& e) {
-    throw std::runtime_error(fmt::format("{}: mesh {}: {}", path.string(), index, e.what()));
-  }
+  return naming(path, [&] { return readFrom(path, index, options); });
 }
 
 }  // namespace lobe

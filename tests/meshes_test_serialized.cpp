@@ -113,7 +113,7 @@ TEST_CASE("scenes: serialized meshes are told apart by index") {
 TEST_CASE("scenes: broken serialized meshes are refused") {
   const Written good;
   const std::string bytes = fileOf({good, good});
-  CHECK_THROWS_WITH(read(bytes, 2), Contains("a.serialized: mesh 2") && Contains("has 2"));
+  CHECK_THROWS_WITH(read(bytes, 2), Contains("a.serialized: there is no mesh 2") && Contains("has 2"));
   CHECK_THROWS_WITH(read("PLY, if anything"), Contains("not a serialized mesh"));
   CHECK_THROWS_WITH(read(""), Contains("not a serialized mesh"));
   CHECK_THROWS_WITH(readSerialized("/none/b.serialized", 0, {}), Contains("b.serialized"));

@@ -215,6 +215,26 @@ TEST_CASE("scenes: meshes are read from beside the scene, with blanks in their n
   CHECK(meshOf(scene, 1).uvs.at(0).y() == 0.25f);
 }
 
+TEST_CASE("scenes: the materials of an OBJ are told apart by name") {
+  const TestFolder folder;
+  folder.write(
+      "a.obj",
+      "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nusemtl OakWood\nf 2 4 3\nf 1 2 4\nusemtl other\nf 1 4 3\n");
+  const std::string colour = "<rgb name=\"reflectance\" value=\"1 0 0\"/></bsdf>";
+  const Scene scene = readScene(folder.write(
+      "test.xml", sceneOf("<bsdf type=\"diffuse\" id=\"red\">" + colour +
+                          "<shape type=\"obj\" id=\"desk\"><string name=\"filename\" value=\"a.obj\"/>"
+                          "<ref name=\"OakWood\" id=\"red\"/><bsdf type=\"diffuse\" name=\"absent\"/></shape>")));
+  REQUIRE(scene.shapes.size() == 2);
+  CHECK(scene.shapes[0].name == "desk:OakWood");
+  CHECK(scene.materials[scene.shapes[0].material].name == "red");
+  CHECK(meshOf(scene, 0).triangles.size() == 2);
+  CHECK(scene.shapes[1].name == "desk");
+  CHECK(meshOf(scene, 1).triangles.size() == 2);
+  CHECK((albedoOf(scene, scene.shapes[1].material) == 0.5f).all());
+  CHECK(scene.notes == std::vector<std::string>{"a.obj: no face is of material \"absent\""});
+}
+
 TEST_CASE("scenes: shapes without a bsdf are grey, or black where they emit") {
   const Scene scene = readBody(
       "<shape type=\"sphere\"/><shape type=\"disk\"><emitter type=\"area\"/></shape>"

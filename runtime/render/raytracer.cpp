@@ -1,6 +1,7 @@
 #include "runtime/render/raytracer.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
@@ -119,6 +120,7 @@ struct RayTracer::Embree {
   std::vector<RTCScene> groups;
   std::vector<Eigen::AlignedBox3f> groupBounds;
   Eigen::AlignedBox3f bounds;
+  double buildSeconds = 0;
 
   explicit Embree(const Scene& source) {
     if (!device) throw std::runtime_error("Embree: no device");
@@ -153,7 +155,9 @@ struct RayTracer::Embree {
       box.extend(shapeBox);
       add(result, shapes[i], static_cast<unsigned>(i));
     }
+    const auto start = std::chrono::steady_clock::now();
     rtcCommitScene(result);
+    buildSeconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (!error.empty()) throw std::runtime_error(fmt::format("Embree: {}", error));
     return result;
   }
@@ -178,6 +182,10 @@ RayTracer::RayTracer(const Scene& scene) : scene_(scene), embree_(std::make_shar
 
 const Eigen::AlignedBox3f& RayTracer::bounds() const {
   return embree_->bounds;
+}
+
+double RayTracer::buildSeconds() const {
+  return embree_->buildSeconds;
 }
 
 std::optional<Hit> RayTracer::intersect(const Ray& ray) const {

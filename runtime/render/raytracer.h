@@ -27,6 +27,9 @@ class RayTracer {
   /// Whether anything is hit in (0, tfar); distances in units of the direction's length.
   bool occluded(const Ray& ray) const;
 
+  /// What Embree took for its acceleration structures.
+  double buildSeconds() const;
+
   /// Of all shapes; empty without shapes.
   const Eigen::AlignedBox3f& bounds() const;
 

@@ -67,7 +67,9 @@ double peakResidentBytes() {
 }
 
 Scene readFor(const RenderJob& job) {
-  Scene scene = readScene(job.scene, {job.definitions, job.lenient});
+  Progress progress("reading", 1.0);
+  Scene scene =
+      readScene(job.scene, {job.definitions, job.lenient, true, [&](double share) { progress.advance(share); }});
   for (const std::string& warning : scene.warnings) printWarning(kTool, warning);
   if (job.size) {
     scene.camera.width = job.size->first;
@@ -129,7 +131,23 @@ struct RunResult {
   double seconds() const { return training().seconds + render.total.seconds; }
 };
 
-nlohmann::ordered_json statistics(const RenderJob& job, const RunResult& run) {
+/// What comes before.
+struct LoadTimes {
+  double reading = 0;   ///< the scene file, its meshes and images
+  double building = 0;  ///< acceleration structure and light tables
+  double embree = 0;    ///< Embree's share of it
+};
+
+class Stopwatch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point start_ = Clock::now();
+};
+
+nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, const RunResult& run) {
   const PathStatistics& paths = run.render.statistics;
   const RenderProgress& total = run.render.total;
   nlohmann::ordered_json shares;
@@ -140,6 +158,9 @@ nlohmann::ordered_json statistics(const RenderJob& job, const RunResult& run) {
         decisions > 0 ? static_cast<double>(paths.strategies[i]) / static_cast<double>(decisions) : 0.0;
   return {{"integrator", nameOf(job.integrator)},
           {"seed", job.seed},
+          {"seconds_reading", load.reading},
+          {"seconds_building", load.building},
+          {"seconds_embree_build", load.embree},
           {"seconds_total", run.seconds()},
           {"seconds_training", run.training().seconds},
           {"seconds_rendering", total.seconds},
@@ -239,12 +260,18 @@ std::string lobefitCommand(const RenderJob& job) {
 void run(const RenderJob& job) {
   job.validate();
   checkFiles(job);
+  LoadTimes load;
+  const Stopwatch reading;
   const Scene scene = readFor(job);
+  load.reading = reading.seconds();
   ConvergenceLog log(job, scene);
   Guiding guiding;
   if (job.integrator == IntegratorKind::product)
     guiding.caches.emplace(job.cacheFolder, lobeRequests(scene), lobefitCommand(job));
+  const Stopwatch building;
   const RenderScene renderScene(scene);
+  load.building = building.seconds();
+  load.embree = renderScene.tracer.buildSeconds();
   const PinholeCamera camera(scene.camera, scene.filter);
   prepare(job, renderScene, camera, guiding);
 
@@ -257,7 +284,7 @@ void run(const RenderJob& job) {
     printWarning(kTool, fmt::format("{} samples were negative or not finite and left out", result.dropped));
   for (const auto& output : job.outputs) writeImage(output, film.mean(), attributes(job, result));
   log.write();
-  if (!job.stats.empty()) writeAtomically(job.stats, statistics(job, result).dump(2) + "\n");
+  if (!job.stats.empty()) writeAtomically(job.stats, statistics(job, load, result).dump(2) + "\n");
 }
 
 }  // namespace lobe
