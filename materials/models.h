@@ -19,6 +19,7 @@ BsdfPtr makeNormalMap(const Parameters& parameters);
 BsdfPtr makeNull(const Parameters& parameters);
 BsdfPtr makePhong(const Parameters& parameters);
 BsdfPtr makePlastic(const Parameters& parameters);
+BsdfPtr makePrincipled(const Parameters& parameters);
 BsdfPtr makeRoughConductor(const Parameters& parameters);
 BsdfPtr makeRoughDielectric(const Parameters& parameters);
 BsdfPtr makeRoughDiffuse(const Parameters& parameters);

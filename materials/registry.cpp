@@ -30,6 +30,7 @@ constexpr std::array kModels = {
     Entry{"null", makeNull},
     Entry{"phong", makePhong},
     Entry{"plastic", makePlastic},
+    Entry{"principled", makePrincipled},
     Entry{"roughconductor", makeRoughConductor},
     Entry{"roughdielectric", makeRoughDielectric},
     Entry{"roughdiffuse", makeRoughDiffuse},

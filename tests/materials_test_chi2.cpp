@@ -138,6 +138,16 @@ TEST_CASE("materials: every model samples its density") {
       {"ward", bsdfOf("ward", {{"alpha_u", 0.3}, {"variant", std::string("ward")}})},
       {"ward-duer", bsdfOf("ward", {{"alpha_v", 0.5}, {"variant", std::string("ward-duer")}})},
       {"balanced ward", bsdfOf("ward", {{"alpha_u", 0.02}, {"alpha_v", 0.3}})},
+      {"principled", bsdfOf("principled", {{"roughness", 0.4}, {"clearcoat", 1.0}, {"sheen", 1.0}})},
+      {"principled metal", bsdfOf("principled", {{"roughness", 0.5}, {"anisotropic", 0.8}, {"metallic", 1.0}})},
+      {"principled glass", bsdfOf("principled", {{"roughness", 0.5}, {"spec_trans", 1.0}, {"eta", 1.5}})},
+      {"all of principled", bsdfOf("principled", {{"roughness", 0.6},
+                                                  {"anisotropic", 0.5},
+                                                  {"metallic", 0.3},
+                                                  {"spec_trans", 0.6},
+                                                  {"clearcoat", 0.7},
+                                                  {"clearcoat_sampling_rate", 4.0},
+                                                  {"specular", 0.8}})},
       {"bumpmap", bsdfOf("bumpmap", {{"map", constantTexture(grey(1.0f))}}, {metal})},
   };
   std::uint64_t seed = 300;

@@ -160,4 +160,29 @@ TEST_CASE("scenes: faults of measured materials are told at their place") {
   CHECK_THAT(faultOf(inSphere("measured", "<float name=\"filename\" value=\"1\"/>")), Catch::Contains("text"));
 }
 
+TEST_CASE("scenes: principled as Mitsuba 3 spells it") {
+  const BsdfPtr bsdf =
+      bsdfOf("<bsdf type=\"principled\"><rgb name=\"base_color\" value=\"1.0,1.0,1.0\"/>" + number("metallic", "0.7") +
+             number("specular", "0.6") + number("roughness", "0.2") + number("spec_tint", "0.4") +
+             number("anisotropic", "0.5") + number("sheen", "0.3") + number("sheen_tint", "0.2") +
+             number("clearcoat", "0.6") + number("clearcoat_gloss", "0.3") + number("spec_trans", "0.4") +
+             number("flatness", "0.1") + number("main_specular_sampling_rate", "1") +
+             number("clearcoat_sampling_rate", "1") + number("diffuse_reflectance_sampling_rate", "1") + "</bsdf>");
+  CHECK(bsdf->transmits());
+  CHECK(bsdf->lobes().size() == 2);
+  const BsdfPtr textured = bsdfOf(
+      "<bsdf type=\"twosided\"><bsdf type=\"principled\"><texture name=\"base_color\" type=\"checkerboard\"/>"
+      "<texture name=\"metallic\" type=\"checkerboard\"/></bsdf></bsdf>");
+  // 0.4 · (1 − 0.4) against 0.2 · (1 − 0.2)
+  CHECK(textured->mixture(kUp, Vec2(0.25f, 0.25f)).constant ==
+        Approx(1.5f * textured->mixture(kUp, Vec2(0.75f, 0.25f)).constant));
+  const std::string fault =
+      faultOf("<bsdf type=\"principled\">\n" + number("eta", "1.5") + "\n" + number("specular", "0.5") + "</bsdf>");
+  INFO(fault);
+  CHECK(fault.starts_with("test.xml:4:1: "));
+  CHECK(fault.find("either eta or specular") != std::string::npos);
+  CHECK(faultOf("<bsdf type=\"principled\">" + number("clearcoat_glass", "1") + "</bsdf>").find("clearcoat_gloss") !=
+        std::string::npos);
+}
+
 }  // namespace lobe
