@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "scenes/reader_environment.h"
+#include "scenes/reader_emitters.h"
 #include "scenes/reader_parameters.h"
 #include "scenes/reader_sensor.h"
 #include "scenes/reader_shapes.h"
@@ -37,7 +37,7 @@ class SceneReader {
     else if (tag == "texture")
       textures_.read(node);
     else if (tag == "emitter")
-      readEnvironment(context_, textures_, node);
+      readEmitter(context_, textures_, node);
     else if (tag == "sensor")
       readFirstSensor(node);
     else if (tag == "integrator")

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include "scenes/emission.h"
 #include "scenes/primitives.h"
 #include "scenes/reader_parameters.h"
 
@@ -200,7 +201,7 @@ void ShapeReader::takeEmitter(pugi::xml_node node, Parts& parts) {
       context_, node, "texture",
       [this](pugi::xml_node child, const std::string& name, Parameters& p) { return textures_.take(child, name, p); });
   parts.emitter = makeFrom(context_, node, parameters,
-                           [](const Parameters& p) { return AreaEmitter{p.texture("radiance", grey(1.0f))}; });
+                           [](const Parameters& p) { return AreaEmitter{emissionTexture(p, "radiance", grey(1.0f))}; });
 }
 
 ShapeReader::Mesh ShapeReader::makeMesh(const std::string& type, const Parameters& parameters,

@@ -89,6 +89,31 @@ struct Environment {
   Eigen::Matrix3f toWorld = Eigen::Matrix3f::Identity();  ///< rotation
 };
 
+/// Equal in all directions, from a point.
+struct PointLight {
+  Vec3 position;
+  Rgb intensity;  ///< power per solid angle
+};
+
+/// A cone of light from a point: of full intensity up to beamWidth from its axis, then falling linearly with the angle
+/// to nothing at the cutoff (Mitsuba's).
+struct SpotLight {
+  Vec3 position;
+  Vec3 direction;   ///< unit, the axis
+  Rgb intensity;    ///< power per solid angle, on the axis
+  float cutoff;     ///< half angle in radians, in (0, π]
+  float beamWidth;  ///< likewise, at most the cutoff
+};
+
+/// Parallel light from infinitely far.
+struct DirectionalLight {
+  Vec3 direction;  ///< unit, the way the light goes
+  Rgb irradiance;  ///< on a surface that faces it
+};
+
+/// Lights that no ray can hit.
+using DeltaLight = std::variant<PointLight, SpotLight, DirectionalLight>;
+
 /// A pinhole. Local +z is the viewing direction, +y up, +x left (Mitsuba's convention).
 struct Camera {
   Eigen::Matrix4f toWorld = Eigen::Matrix4f::Identity();
@@ -113,6 +138,7 @@ struct Scene {
   std::vector<ShapeGroup> groups;
   std::vector<Material> materials;
   std::optional<Environment> environment;
+  std::vector<DeltaLight> lights;  ///< besides the emitting shapes
   Camera camera;
   PixelFilter filter;
   std::optional<int> maxDepth;        ///< as the file says, in segments; the command line overrides

@@ -2,6 +2,7 @@
 
 #include "chi2.h"
 #include "render_test_tools.h"
+#include "runtime/render/particle_tracer.h"
 
 using namespace lobe;
 using namespace lobe::test;
@@ -165,6 +166,58 @@ TEST_CASE("render: what an environment's file has wrong counts as black") {
   CHECK(ready.lights.environmentPdf({0, 1, 0}) == 0);
 }
 
+TEST_CASE("render: delta lights have the flux of their closed forms, whatever the scene's size") {
+  const auto power = [](const DeltaLight& light, float size) {
+    Scene scene;
+    addShape(scene, Sphere{{0, 0, 0}, size}, -1);
+    scene.lights = {light};
+    const RenderScene ready(scene);
+    CHECK(ready.lights.environmentProbability() == 0);
+    Rng rng(3);
+    Moments photons;
+    for (int i = 0; i < 20000; ++i) {
+      const float choice = rng.uniform();
+      const Vec2 u1 = rng.uniform2();
+      const auto photon = ready.lights.samplePhoton(choice, u1, rng.uniform2());
+      photons.add(photon ? luminance(photon->power) / ready.lights.totalPower() : 0);
+      if (photon) CHECK(photon->emitterDensity == kInfinity);
+    }
+    CHECK(deviation(photons, 1) < kMaxDeviation);
+    return ready.lights.totalPower();
+  };
+  CHECK(power(PointLight{{0, 0, 0}, grey(2)}, 1) == Approx(8 * kPi));
+  const Vec3 axis = Vec3(1, 2, -2) / 3;
+  const auto spot = [&](float cutoff, float beam) { return SpotLight{{0, 0, 0}, axis, grey(2), cutoff, beam}; };
+  CHECK(power(spot(kPi, kPi), 1) == Approx(8 * kPi));
+  CHECK(power(spot(kPi / 3, kPi / 3), 1) == Approx(2 * kPi));
+  CHECK(power(spot(kPi / 2, 0), 1) == Approx(4 * kPi * (1 - 2 / kPi)));
+  CHECK(power(spot(1e-3f, 1e-3f), 1) == Approx(2 * kPi * 1e-6));
+  const double root3 = std::sqrt(3.0);  // the bounding box's corner
+  for (const float size : {1e-9f, 1.0f, 1e15f})
+    CHECK(power(DirectionalLight{axis, grey(2)}, size) == Approx(2 * kPi * std::pow(root3 * size, 2)).epsilon(1e-4));
+}
+
+TEST_CASE("render: what emitter sampling does alone is not learnt") {
+  Scene scene;
+  addShape(scene, rectangle({-5, 0, -5}, {0, 0, 10}, {10, 0, 0}), addMaterial(scene, std::make_shared<Diffuse>(0.5f)));
+  SECTION("point") {
+    scene.lights.push_back(PointLight{{0, 1, 0}, grey(1)});
+  }
+  SECTION("directional") {
+    scene.lights.push_back(DirectionalLight{{0, -1, 0}, grey(1)});
+  }
+  const RenderScene ready(scene);
+  const IlluminationCache nothing;
+  const GuidedSampler sampler(scene, nothing, nullptr);
+  const PinholeCamera camera({}, {});
+  const auto particles = [&](const RenderScene& s) {
+    return ParticleTracer(s, camera, sampler, nullptr, 1).tracePhotons(0, 2000).size();
+  };
+  CHECK(particles(ready) == 0);
+  addShape(scene, Sphere{{0, 5, 0}, 4}, 0);  // what comes from the floor by way of a sphere is
+  CHECK(particles(RenderScene(scene)) > 10);
+}
+
 namespace {
 
 // Photons that reach a disk, against the light that reaches it as seen from its points.
@@ -215,7 +268,19 @@ TEST_CASE("render: photons bring the light that is gathered") {
   SECTION("environment") {
     scene.environment = turnedSky();
   }
+  SECTION("point") {
+    scene.lights.push_back(PointLight{{0.5f, 1, 0.2f}, grey(2)});
+  }
+  SECTION("spot") {
+    const Vec3 axis = Vec3(-0.4f, -1, 0).normalized();
+    scene.lights.push_back(SpotLight{{0.5f, 1, 0.2f}, axis, grey(2), 0.6f, 0.2f});
+  }
+  SECTION("directional") {
+    scene.lights.push_back(DirectionalLight{Vec3(1, -2, 0).normalized(), grey(2)});
+  }
   SECTION("mixed") {
+    scene.lights.push_back(PointLight{{0.5f, 1, 0.2f}, grey(2)});
+    scene.lights.push_back(DirectionalLight{Vec3(1, -2, 0).normalized(), grey(3)});
     scene.environment = environment(Image(1, 1, grey(1)));
     addEmitter(scene, Sphere{{0.5f, 1.5f, 0}, 0.5f}, 20);
   }

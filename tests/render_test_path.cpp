@@ -74,6 +74,45 @@ TEST_CASE("render: direct light has its closed form") {
     scene.environment = environment(Image(1, 1, grey(3)));
     CHECK(deviationOfDirect(scene, kAlbedo * 3) < kMaxDeviation);
   }
+  SECTION("point") {
+    scene.lights.push_back(PointLight{{1, 2, -1}, grey(3)});
+    CHECK(directLight(scene).mean() == Approx(kAlbedo / kPi * 3 * 2 / std::pow(6, 1.5)).epsilon(1e-5));
+  }
+  SECTION("point below the floor") {
+    scene.lights.push_back(PointLight{{1, -2, -1}, grey(3)});
+    CHECK(directLight(scene).mean() == 0);
+  }
+  SECTION("point behind a screen") {
+    scene.lights.push_back(PointLight{{1, 2, -1}, grey(3)});
+    addShape(scene, Sphere{{0.75f, 1.5f, -0.75f}, 0.01f}, -1);
+    CHECK(directLight(scene).mean() == 0);
+    std::get<PointLight>(scene.lights[0]).position *= 0.5f;  // in front of it
+    CHECK(directLight(scene).mean() == Approx(kAlbedo / kPi * 4 * 3 * 2 / std::pow(6, 1.5)).epsilon(1e-5));
+  }
+  SECTION("spot") {
+    // The origin is seen at 30° from the axis, halfway between beam width and cutoff.
+    const float angle = kPi / 6;
+    scene.lights.push_back(
+        SpotLight{{0, 2, 0}, {std::sin(angle), -std::cos(angle), 0}, grey(3), kPi / 5, kPi * 2 / 15});
+    CHECK(directLight(scene).mean() == Approx(0.5 * kAlbedo / kPi * 3 / 4).epsilon(1e-5));
+    auto& spot = std::get<SpotLight>(scene.lights[0]);
+    spot.direction = {0, -1, 0};
+    CHECK(directLight(scene).mean() == Approx(kAlbedo / kPi * 3 / 4).epsilon(1e-5));
+    spot.direction = {0, 1, 0};
+    CHECK(directLight(scene).mean() == 0);
+  }
+  SECTION("directional") {
+    scene.lights.push_back(DirectionalLight{Vec3(2, -1, 2) / 3, grey(3)});
+    CHECK(directLight(scene).mean() == Approx(kAlbedo / kPi * 3 / 3).epsilon(1e-5));
+  }
+  SECTION("delta lights beside others") {
+    addEmitter(scene, rectangle({-1, 1, -2}, {2, 0, 0}, {0, 0, 4}), 3);
+    scene.lights.push_back(PointLight{{0, 0.5f, 0}, grey(2)});
+    scene.lights.push_back(DirectionalLight{Vec3(3, -4, 0) / 5, grey(1)});
+    const double truth =
+        kAlbedo * (3 * 4 * cornerFactor(1, 2) + 2 / (0.25 * kPi));  // the rectangle shades the parallel light
+    CHECK(deviationOfDirect(scene, truth) < kMaxDeviation);
+  }
   SECTION("several at once") {
     addEmitter(scene, rectangle({-1, 1, -2}, {2, 0, 0}, {0, 0, 4}), 3);
     scene.environment = environment(Image(1, 1, grey(2)));

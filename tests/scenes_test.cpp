@@ -313,6 +313,33 @@ TEST_CASE("scenes: environments") {
       faultOf("<emitter type=\"constant\"/>\n<emitter type=\"constant\"/>").starts_with("test.xml:3:1: a second env"));
 }
 
+TEST_CASE("scenes: point, spot and directional lights") {
+  const Scene scene = readBody(
+      "<emitter type=\"point\"><point name=\"position\" x=\"1\" y=\"2\" z=\"3\"/>"
+      "<rgb name=\"intensity\" value=\"4 5 6\"/></emitter>"
+      "<emitter type=\"point\"><transform name=\"toWorld\"><translate x=\"7\"/></transform>"
+      "<float name=\"samplingWeight\" value=\"2\"/></emitter>"
+      "<emitter type=\"spot\"><transform name=\"toWorld\"><lookat origin=\"1 0 0\" target=\"1 -2 0\" up=\"0 0 1\"/>"
+      "</transform><float name=\"cutoffAngle\" value=\"40\"/></emitter>"
+      "<emitter type=\"directional\"><vector name=\"direction\" y=\"-3\"/><float name=\"irradiance\" value=\"2\"/>"
+      "</emitter>"
+      "<emitter type=\"directional\"><transform name=\"toWorld\"><rotate y=\"1\" angle=\"90\"/></transform></emitter>");
+  REQUIRE(scene.lights.size() == 5);
+  CHECK(std::get<PointLight>(scene.lights[0]).position == Vec3(1, 2, 3));
+  CHECK((std::get<PointLight>(scene.lights[0]).intensity == Rgb(4, 5, 6)).all());
+  CHECK(std::get<PointLight>(scene.lights[1]).position == Vec3(7, 0, 0));
+  CHECK(scene.notes == std::vector<std::string>{"emitter \"point\": no effect of sampling_weight"});
+  const auto& spot = std::get<SpotLight>(scene.lights[2]);
+  CHECK(spot.position == Vec3(1, 0, 0));
+  CHECK(spot.direction.isApprox(Vec3(0, -1, 0)));
+  CHECK(spot.cutoff == Approx(40 * std::numbers::pi / 180));
+  CHECK(spot.beamWidth == Approx(30 * std::numbers::pi / 180));
+  CHECK((spot.intensity == 1.0f).all());
+  CHECK(std::get<DirectionalLight>(scene.lights[3]).direction.isApprox(Vec3(0, -1, 0)));
+  CHECK((std::get<DirectionalLight>(scene.lights[3]).irradiance == 2.0f).all());
+  CHECK(std::get<DirectionalLight>(scene.lights[4]).direction.isApprox(Vec3(1, 0, 0), 1e-5f));
+}
+
 TEST_CASE("scenes: bitmaps with wrap modes, scales, filters and encodings") {
   const TestFolder folder;
   folder.write("a b.bmp", blackAndWhiteBmp());

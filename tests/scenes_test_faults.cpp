@@ -45,7 +45,8 @@ TEST_CASE("scenes: unknown elements and types are told with what is known") {
   checkFault(faultOf("\n <bsdf type=\"velvet\" id=\"NotUsed\"/>"), "3:2", {"\"velvet\""});
   checkFault(faultOf("<shape type=\"torus\"/>"), "2:1",
              {"\"torus\"", "cube, cylinder, disk, instance, obj, ply, rectangle, serialized, shapegroup, sphere"});
-  checkFault(faultOf("<emitter type=\"spot\"/>"), "2:1", {"\"spot\"", "area, constant, envmap"});
+  checkFault(faultOf("<emitter type=\"laser\"/>"), "2:1",
+             {"\"laser\"", "area, constant, directional, envmap, point, spot"});
   checkFault(faultOf("<emitter type=\"area\"/>"), "2:1", {"inside a shape"});
   checkFault(faultOf("<shape type=\"disk\"><emitter type=\"spot\"/></shape>"), "2:20", {"\"spot\"", "area"});
   checkFault(faultOf("<texture type=\"wood\"/>"), "2:1", {"\"wood\"", "bitmap, checkerboard, scale"});
@@ -103,6 +104,29 @@ TEST_CASE("scenes: wrong values are told with their text") {
   checkFault(faultOfText("<scene><sensor type=\"perspective\"><string name=\"focal_length\" value=\"long\"/></sensor>"
                          "</scene>"),
              "1:35", {"long", "50mm"});
+}
+
+TEST_CASE("scenes: emitters without meaning are refused") {
+  const auto fault = [](const std::string& type, const std::string& body) {
+    return faultOf("<emitter type=\"" + type + "\">\n  " + body + "</emitter>");
+  };
+  checkFault(fault("point", "<rgb name=\"intensity\" value=\"1 -2 3\"/>"), "3:3", {"intensity", "negative", "-2"});
+  checkFault(fault("spot", "<float name=\"intensity\" value=\"-1\"/>"), "3:3", {"intensity", "negative"});
+  checkFault(fault("directional", "<float name=\"irradiance\" value=\"-1\"/>"), "3:3", {"irradiance", "negative"});
+  checkFault(fault("constant", "<float name=\"radiance\" value=\"-1\"/>"), "3:3", {"radiance", "negative"});
+  checkFault(fault("envmap", "<float name=\"scale\" value=\"-1\"/>"), "3:3", {"scale", "negative"});
+  checkFault(faultOf("<shape type=\"disk\"><emitter type=\"area\">\n<rgb name=\"radiance\" value=\"0 0 -1\"/></emitter>"
+                     "</shape>"),
+             "3:1", {"radiance", "negative", "-1"});
+  checkFault(fault("spot", "<float name=\"cutoffAngle\" value=\"0\"/>"), "3:3", {"cutoff_angle", "180"});
+  checkFault(fault("spot", "<float name=\"beamWidth\" value=\"25\"/>"), "3:3", {"beam_width", "20", "25"});
+  checkFault(fault("spot", "<texture type=\"checkerboard\"/>"), "3:3", {"texture", "spot"});
+  checkFault(fault("directional", "<vector name=\"direction\" x=\"0\"/>"), "3:3", {"direction", "zero"});
+  checkFault(fault("point", "<point name=\"position\" x=\"1\"/><transform name=\"toWorld\"/>"), "3:33",
+             {"position", "to_world"});
+  checkFault(fault("directional", "<vector name=\"direction\" x=\"1\"/><transform name=\"toWorld\"/>"), "3:35",
+             {"direction", "to_world"});
+  checkFault(fault("point", "<float name=\"power\" value=\"1\"/>"), "3:3", {"\"power\"", "intensity"});
 }
 
 TEST_CASE("scenes: missing and damaged files are told with both names") {
@@ -168,7 +192,7 @@ TEST_CASE("scenes: lenient reading replaces what it does not know and warns once
       "type=\"bitmap\">"
       "<string name=\"filename\" value=\"none.png\"/></texture></bsdf></bsdf>"
       "<float name=\"shine\" value=\"1\"/></shape>"
-      "<emitter type=\"point\"/><gizmo/>",
+      "<emitter type=\"laser\"/><gizmo/>",
       lenient());
   REQUIRE(scene.shapes.size() == 2);
   CHECK(scene.shapes[0].name == "Kept");

@@ -1,7 +1,9 @@
 #include "runtime/render/lights.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include "runtime/render/delta_lights.h"
 #include "runtime/render/shape_geometry.h"
 
 namespace lobe {
@@ -70,13 +72,17 @@ float toSolidAngle(float areaDensity, float distance2, float cosine) {
 
 }  // namespace
 
+Vec3 SceneSphere::start(const Vec3& wi, const Vec2& u) const {
+  const Vec2 d = squareToDisk(u) * radius;
+  return centre + Frame::fromNormal(wi).toWorld({d.x(), d.y(), radius});
+}
+
 Lights::Lights(const Scene& scene, const Eigen::AlignedBox3f& bounds)
     : scene_(scene), lightOfShape_(scene.shapes.size(), -1) {
   if (!bounds.isEmpty()) {
-    centre_ = bounds.center();
-    radius_ = 0.5f * bounds.diagonal().norm();
+    sphere_ = {bounds.center(), 0.5f * bounds.diagonal().norm()};
   }
-  std::vector<float> powers;
+  std::vector<double> powers;
   for (std::size_t i = 0; i < scene.shapes.size(); ++i) {
     const Shape& shape = scene.shapes[i];
     if (!shape.emitter) continue;
@@ -89,14 +95,27 @@ Lights::Lights(const Scene& scene, const Eigen::AlignedBox3f& bounds)
     }
     if (!(light.area > 0.0f)) continue;
     lightOfShape_[i] = static_cast<int>(areas_.size());
-    powers.push_back(std::max(0.0f, kPi * light.area * luminance(shape.emitter->radiance->mean())));
+    powers.push_back(static_cast<double>(kPi) * light.area * luminance(shape.emitter->radiance->mean()));
     areas_.push_back(std::move(light));
   }
+  for (const DeltaLight& light : scene.lights) powers.push_back(powerOf(light, sphere_));
   if (scene.environment) {
     environment_.emplace(*scene.environment);
-    powers.push_back(static_cast<float>(environment_->flux() * kPi * radius_ * radius_));
+    powers.push_back(environment_->flux() * kPi * sphere_.radius * sphere_.radius);
   }
-  choice_ = DiscreteDistribution(powers);
+  choose(powers);
+}
+
+// In a scene of kilometres or micrometres, powers may exceed what a float holds; their ratios do not.
+void Lights::choose(const std::vector<double>& powers) {
+  double largest = 0;
+  for (const double power : powers) largest = std::max(largest, power);
+  std::vector<float> weights;
+  for (const double power : powers) {
+    weights.push_back(largest > 0 ? static_cast<float>(std::max(0.0, power) / largest) : 0.0f);
+    totalPower_ += std::max(0.0, power);
+  }
+  choice_ = DiscreteDistribution(weights);
 }
 
 Lights::PointSample Lights::samplePoint(const AreaLight& light, float choice, const Vec2& u) const {
@@ -145,8 +164,12 @@ std::optional<LightSample> Lights::sampleEnvironment(const Vec2& u) const {
 std::optional<LightSample> Lights::sample(const Vec3& point, float choice, const Vec2& u) const {
   if (empty()) return std::nullopt;
   const std::size_t light = choice_.sample(choice);
-  std::optional<LightSample> result =
-      light < areas_.size() ? sampleArea(areas_[light], point, choice, u) : sampleEnvironment(u);
+  const auto sampleChosen = [&] {
+    if (light < areas_.size()) return sampleArea(areas_[light], point, choice, u);
+    const std::size_t delta = light - areas_.size();
+    return delta < scene_.lights.size() ? illuminate(scene_.lights[delta], point) : sampleEnvironment(u);
+  };
+  std::optional<LightSample> result = sampleChosen();
   if (result) result->pdf *= choice_.probability(light);
   return result;
 }
@@ -181,14 +204,12 @@ std::optional<EmittedPhoton> Lights::areaPhoton(const AreaLight& light, float ch
 }
 
 EmittedPhoton Lights::photonFromEnvironment(const EnvironmentSample& from, const Vec2& u) const {
-  const Vec2 d = squareToDisk(u) * radius_;
-  const Vec3 origin = centre_ + Frame::fromNormal(from.wi).toWorld({d.x(), d.y(), radius_});
-  const Rgb power = from.radiance * (kPi * radius_ * radius_ / from.pdf);
-  return {{origin, -from.wi}, power, true, environmentPdf(from.wi), Vec3::Zero()};
+  const Rgb power = from.radiance * (kPi * sphere_.radius * sphere_.radius / from.pdf);
+  return {{sphere_.start(from.wi, u), -from.wi}, power, true, environmentPdf(from.wi), Vec3::Zero()};
 }
 
 Vec2 Lights::photonCoordinates(const Vec3& point, const Vec3& wi) const {
-  const Vec3 local = Frame::fromNormal(wi).toLocal(point - centre_) / radius_;
+  const Vec3 local = Frame::fromNormal(wi).toLocal(point - sphere_.centre) / sphere_.radius;
   const float azimuth = std::atan2(local.y(), local.x()) * (0.5f * kInvPi);
   return Vec2(local.head<2>().squaredNorm(), azimuth - std::floor(azimuth)).cwiseMin(kOneMinusEpsilon);
 }
@@ -199,6 +220,8 @@ std::optional<EmittedPhoton> Lights::samplePhoton(float choice, const Vec2& u1, 
   if (light < areas_.size()) {
     photon = areaPhoton(areas_[light], choice, u1, u2);
     photon->emitterDensity *= choice_.probability(light);
+  } else if (const std::size_t delta = light - areas_.size(); delta < scene_.lights.size()) {
+    photon = emit(scene_.lights[delta], sphere_, u1, u2);
   } else if (const std::optional<EnvironmentSample> from = environment_->sample(u1)) {
     photon = photonFromEnvironment(*from, u2);
   }

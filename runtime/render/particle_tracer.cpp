@@ -101,12 +101,12 @@ Vec3 normalTowards(const SurfaceHit& hit) {
   return std::copysign(1.0f, hit.normal.dot(hit.woWorld)) * hit.normal;
 }
 
-/// What BSDF sampling is left with where emitter sampling finds the same light; a cosine stands for the density to
-/// come.
+/// What BSDF sampling is left with where emitter sampling finds the same light (nothing of a delta light's); a cosine
+/// stands for the density to come.
 float directShare(const EmittedPhoton& photon, const SurfaceHit& hit) {
   const float cosine = std::abs(hit.normal.dot(hit.woWorld));
   float emitter = photon.emitterDensity;
-  if (!photon.environment) {
+  if (!photon.far) {
     const float cosineAtLight = std::abs(photon.normal.dot(photon.ray.direction));
     emitter *= hit.distance * hit.distance / std::max(cosineAtLight, 1e-6f);
   }
@@ -176,7 +176,7 @@ void ParticleTracer::addDirectUse(const SurfaceHit& hit, const GuidedSampler::Ve
                                   int depth, Rng& rng, ImportonResult& result) const {
   const float choice = rng.uniform();
   const std::optional<LightSample> light = scene_.lights.sample(hit.position, choice, rng.uniform2());
-  if (!light || light->source) return;
+  if (!light || light->source || light->delta) return;
   const Vec3 wi = hit.frame.toLocal(light->wi);
   if (!sidesAgree(hit, light->wi, wi)) return;
   const Rgb value = throughput * hit.bsdf->eval(hit.wo, wi, hit.uv) * light->radiance;
@@ -209,7 +209,7 @@ void ParticleTracer::tracePhoton(Rng& rng, std::vector<Particle>& particles) con
     const std::optional<SurfaceHit> hit = scene_.tracer.trace(flight.ray);
     if (!hit || !hit->bsdf || !sidesAgree(*hit, hit->woWorld, hit->wo)) return;
     if (hit->bsdf->deltaProbability(hit->wo, hit->uv) < 1) {
-      const bool far = depth == 1 && photon->environment;
+      const bool far = depth == 1 && photon->far;
       const float weight = luminance(flight.weight) * (depth == 1 ? directShare(*photon, *hit) : 1.0f);
       if (weight > 0 && std::isfinite(weight))
         particles.push_back(

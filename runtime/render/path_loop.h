@@ -121,7 +121,7 @@ class PathLoop {
     if (!(value.maxCoeff() > 0.0f)) return;
     ++path.statistics.shadowRays;
     if (!scene_.visible(hit, *light)) return;
-    const float weight = misWeight(light->pdf, share * vertex.pdf(wi));
+    const float weight = light->delta ? 1.0f : misWeight(light->pdf, share * vertex.pdf(wi));
     path.radiance += path.throughput * value * (std::abs(wi.z()) * weight / light->pdf);
   }
 

@@ -1,0 +1,35 @@
+#include "scenes/emission.h"
+
+#include <fmt/format.h>
+
+namespace lobe {
+namespace {
+
+void check(const char* name, const Rgb& colour) {
+  // Negated, so that it holds for what is no number.
+  if (!(colour.minCoeff() >= 0.0f))
+    throw ParameterError(
+        name, fmt::format("{} must not be negative, but is {} {} {}", name, colour.x(), colour.y(), colour.z()));
+}
+
+}  // namespace
+
+Rgb emission(const Parameters& parameters, const char* name, const Rgb& fallback) {
+  const Rgb colour = parameters.colour(name, fallback);
+  check(name, colour);
+  return colour;
+}
+
+TexturePtr emissionTexture(const Parameters& parameters, const char* name, const Rgb& fallback) {
+  TexturePtr texture = parameters.texture(name, fallback);
+  check(name, texture->mean());
+  return texture;
+}
+
+double emissionScale(const Parameters& parameters, const char* name, double fallback) {
+  const double scale = parameters.number(name, fallback);
+  if (!(scale >= 0.0)) throw ParameterError(name, fmt::format("{} must not be negative, not {}", name, scale));
+  return scale;
+}
+
+}  // namespace lobe

@@ -1,0 +1,143 @@
+#include "scenes/reader_emitters.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "scenes/emission.h"
+#include "scenes/reader_parameters.h"
+
+namespace lobe {
+namespace {
+
+/// The rotation in to_world; a uniform scale and a translation do not matter infinitely far away.
+Eigen::Matrix3f readRotation(const Parameters& parameters) {
+  Eigen::Matrix3d m = parameters.transform("to_world").topLeftCorner<3, 3>();
+  m /= std::cbrt(std::abs(m.determinant()));
+  // Negated, so that it holds for a singular matrix (NaN).
+  if (!((m.transpose() * m).isIdentity(1e-3)))
+    throw ParameterError("to_world", "to_world of an environment must be a rotation");
+  return m.cast<float>();
+}
+
+Environment makeConstant(const Parameters& parameters) {
+  return {Image(1, 1, emission(parameters, "radiance", grey(1.0f)))};
+}
+
+std::optional<Environment> makeFromImage(ReadContext& context, TextureReader& textures, pugi::xml_node node,
+                                         const Parameters& parameters) {
+  Environment environment;
+  environment.toWorld = readRotation(parameters);
+  const auto scale = static_cast<float>(emissionScale(parameters, "scale", 1.0));
+  imageRequest(context, parameters);  // checks and uses its parameters, whether or not the image is wanted
+  if (!context.options.geometry) return std::nullopt;
+  const std::shared_ptr<const Image> image = textures.images().get(context, node, parameters, "it is left out");
+  if (!image) return std::nullopt;
+  environment.radiance = *image;
+  for (Rgb& pixel : environment.radiance.pixels) pixel *= scale;
+  return environment;
+}
+
+Vec3 readPosition(const Parameters& parameters) {
+  if (!parameters.has("position")) return toWorld(parameters).topRightCorner<3, 1>();
+  if (parameters.has("to_world")) throw ParameterError("to_world", "give either position or to_world");
+  return parameters.colour("position", Rgb::Zero()).matrix();
+}
+
+/// Where +z of the emitter's frame points to.
+Vec3 readAxis(const Parameters& parameters, const Vec3& axis) {
+  if (!(axis.norm() > 0.0f))
+    throw ParameterError(parameters.has("direction") ? "direction" : "to_world", "the light's direction is zero");
+  return axis.normalized();
+}
+
+PointLight makePoint(const Parameters& parameters) {
+  return {readPosition(parameters), emission(parameters, "intensity", grey(1.0f))};
+}
+
+SpotLight makeSpot(const Parameters& parameters) {
+  const Eigen::Matrix4f frame = toWorld(parameters);
+  const double cutoff = parameters.number("cutoff_angle", 20.0);
+  if (!(cutoff > 0.0 && cutoff <= 180.0))
+    throw ParameterError("cutoff_angle",
+                         fmt::format("cutoff_angle must be over 0 and at most 180 degrees, not {}", cutoff));
+  const double beam = parameters.number("beam_width", 0.75 * cutoff);
+  if (!(beam >= 0.0 && beam <= cutoff))
+    throw ParameterError("beam_width",
+                         fmt::format("beam_width must be between 0 and the cutoff_angle, {}, not {}", cutoff, beam));
+  constexpr double kDegree = std::numbers::pi / 180.0;
+  return {frame.topRightCorner<3, 1>(), readAxis(parameters, frame.block<3, 1>(0, 2)),
+          emission(parameters, "intensity", grey(1.0f)), static_cast<float>(cutoff * kDegree),
+          static_cast<float>(beam * kDegree)};
+}
+
+DirectionalLight makeDirectional(const Parameters& parameters) {
+  if (parameters.has("direction") && parameters.has("to_world"))
+    throw ParameterError("to_world", "give either direction or to_world");
+  const Vec3 axis = parameters.has("direction") ? Vec3(parameters.colour("direction", Rgb::Zero()).matrix())
+                                                : Vec3(toWorld(parameters).block<3, 1>(0, 2));
+  return {readAxis(parameters, axis), emission(parameters, "irradiance", grey(1.0f))};
+}
+
+DeltaLight makeDelta(const std::string& type, const Parameters& parameters) {
+  if (type == "point") return makePoint(parameters);
+  if (type == "spot") return makeSpot(parameters);
+  return makeDirectional(parameters);
+}
+
+constexpr std::array<std::string_view, 3> kDeltaTypes = {"directional", "point", "spot"};
+constexpr std::array<std::string_view, 6> kTypes = {"area", "constant", "directional", "envmap", "point", "spot"};
+
+/// Lights are chosen by power, whatever the file would have.
+void ignoreSamplingWeight(ReadContext& context, pugi::xml_node node, const Parameters& parameters) {
+  if (!parameters.has("sampling_weight")) return;
+  parameters.number("sampling_weight", 1.0);
+  context.note(fmt::format("{}: no effect of sampling_weight", describe(node)));
+}
+
+Parameters readEmitterParameters(ReadContext& context, pugi::xml_node node, const std::string& type) {
+  const auto refuseTexture = [&](pugi::xml_node child, const std::string&, Parameters&) {
+    if (type != "spot" || elementName(child) != "texture") return false;
+    context.unsupported(child, "texture of a spot", "a spot's texture is not supported: it shines evenly",
+                        "it is left out");
+    return true;
+  };
+  return readParameters(context, node, "", refuseTexture);
+}
+
+void readDelta(ReadContext& context, pugi::xml_node node, const std::string& type) {
+  const Parameters parameters = readEmitterParameters(context, node, type);
+  const DeltaLight light = makeFrom(context, node, parameters, [&](const Parameters& p) {
+    ignoreSamplingWeight(context, node, p);
+    return makeDelta(type, p);
+  });
+  if (context.options.geometry) context.scene.lights.push_back(light);
+}
+
+void readEnvironment(ReadContext& context, TextureReader& textures, pugi::xml_node node, const std::string& type) {
+  const Parameters parameters = readParameters(context, node);
+  std::optional<Environment> environment = makeFrom(context, node, parameters, [&](const Parameters& p) {
+    ignoreSamplingWeight(context, node, p);
+    return type == "constant" ? makeConstant(p) : makeFromImage(context, textures, node, p);
+  });
+  if (context.scene.environment) context.file.fail(node, "a second environment: there may be one constant or envmap");
+  if (context.options.geometry && environment) context.scene.environment = std::move(environment);
+}
+
+}  // namespace
+
+void readEmitter(ReadContext& context, TextureReader& textures, pugi::xml_node node) {
+  const std::string type = typeOf(context, node);
+  if (type == "area") context.file.fail(node, "an area emitter must stand inside a shape");
+  if (std::ranges::find(kDeltaTypes, type) != kDeltaTypes.end()) return readDelta(context, node, type);
+  if (type == "constant" || type == "envmap") return readEnvironment(context, textures, node, type);
+  context.unsupported(node, "emitter " + type,
+                      fmt::format("unknown emitter type \"{}\"; known are {}", type, fmt::join(kTypes, ", ")),
+                      "it is left out");
+}
+
+}  // namespace lobe
