@@ -18,12 +18,13 @@ class SceneReader {
       : context_(context),
         textures_(context),
         materials_(context, textures_),
-        shapes_(context, textures_, materials_) {}
+        shapes_(context, textures_, materials_),
+        emitters_(context, textures_) {}
 
   void read() {
     for (const pugi::xml_node node : context_.file.scene().children()) readElement(node);
-    if (!sensor_ && context_.options.geometry)
-      context_.file.fail(context_.file.scene(), "the scene has no <sensor type=\"perspective\">");
+    if (!sensor_ && context_.options.geometry) context_.file.fail(context_.file.scene(), "the scene has no <sensor>");
+    emitters_.finish();
     if (context_.options.geometry) shapes_.readMeshes();
   }
 
@@ -37,7 +38,7 @@ class SceneReader {
     else if (tag == "texture")
       textures_.read(node);
     else if (tag == "emitter")
-      readEmitter(context_, textures_, node);
+      emitters_.add(node);
     else if (tag == "sensor")
       readFirstSensor(node);
     else if (tag == "integrator")
@@ -64,6 +65,7 @@ class SceneReader {
   TextureReader textures_;
   MaterialReader materials_;
   ShapeReader shapes_;
+  EmitterReader emitters_;
   bool sensor_ = false;
 };
 

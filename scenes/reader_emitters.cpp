@@ -14,16 +14,6 @@
 namespace lobe {
 namespace {
 
-/// The rotation in to_world; a uniform scale and a translation do not matter infinitely far away.
-Eigen::Matrix3f readRotation(const Parameters& parameters) {
-  Eigen::Matrix3d m = parameters.transform("to_world").topLeftCorner<3, 3>();
-  m /= std::cbrt(std::abs(m.determinant()));
-  // Negated, so that it holds for a singular matrix (NaN).
-  if (!((m.transpose() * m).isIdentity(1e-3)))
-    throw ParameterError("to_world", "to_world of an environment must be a rotation");
-  return m.cast<float>();
-}
-
 Environment makeConstant(const Parameters& parameters) {
   return {Image(1, 1, emission(parameters, "radiance", grey(1.0f)))};
 }
@@ -31,7 +21,7 @@ Environment makeConstant(const Parameters& parameters) {
 std::optional<Environment> makeFromImage(ReadContext& context, TextureReader& textures, pugi::xml_node node,
                                          const Parameters& parameters) {
   Environment environment;
-  environment.toWorld = readRotation(parameters);
+  environment.toWorld = rotationOf(parameters, "to_world");
   const auto scale = static_cast<float>(emissionScale(parameters, "scale", 1.0));
   imageRequest(context, parameters);  // checks and uses its parameters, whether or not the image is wanted
   if (!context.options.geometry) return std::nullopt;
@@ -90,14 +80,8 @@ DeltaLight makeDelta(const std::string& type, const Parameters& parameters) {
 }
 
 constexpr std::array<std::string_view, 3> kDeltaTypes = {"directional", "point", "spot"};
-constexpr std::array<std::string_view, 6> kTypes = {"area", "constant", "directional", "envmap", "point", "spot"};
-
-/// Lights are chosen by power, whatever the file would have.
-void ignoreSamplingWeight(ReadContext& context, pugi::xml_node node, const Parameters& parameters) {
-  if (!parameters.has("sampling_weight")) return;
-  parameters.number("sampling_weight", 1.0);
-  context.note(fmt::format("{}: no effect of sampling_weight", describe(node)));
-}
+constexpr std::array<std::string_view, 9> kTypes = {"area", "constant", "directional", "envmap", "point",
+                                                    "sky",  "spot",     "sun",         "sunsky"};
 
 Parameters readEmitterParameters(ReadContext& context, pugi::xml_node node, const std::string& type) {
   const auto refuseTexture = [&](pugi::xml_node child, const std::string&, Parameters&) {
@@ -106,38 +90,50 @@ Parameters readEmitterParameters(ReadContext& context, pugi::xml_node node, cons
                         "it is left out");
     return true;
   };
-  return readParameters(context, node, "", refuseTexture);
-}
-
-void readDelta(ReadContext& context, pugi::xml_node node, const std::string& type) {
-  const Parameters parameters = readEmitterParameters(context, node, type);
-  const DeltaLight light = makeFrom(context, node, parameters, [&](const Parameters& p) {
-    ignoreSamplingWeight(context, node, p);
-    return makeDelta(type, p);
-  });
-  if (context.options.geometry) context.scene.lights.push_back(light);
-}
-
-void readEnvironment(ReadContext& context, TextureReader& textures, pugi::xml_node node, const std::string& type) {
-  const Parameters parameters = readParameters(context, node);
-  std::optional<Environment> environment = makeFrom(context, node, parameters, [&](const Parameters& p) {
-    ignoreSamplingWeight(context, node, p);
-    return type == "constant" ? makeConstant(p) : makeFromImage(context, textures, node, p);
-  });
-  if (context.scene.environment) context.file.fail(node, "a second environment: there may be one constant or envmap");
-  if (context.options.geometry && environment) context.scene.environment = std::move(environment);
+  Parameters parameters = readParameters(context, node, "", refuseTexture);
+  // Lights are chosen by power, whatever the file would have.
+  if (parameters.has("sampling_weight")) {
+    parameters.number("sampling_weight", 1.0);
+    context.note(fmt::format("{}: no effect of sampling_weight", describe(node)));
+  }
+  return parameters;
 }
 
 }  // namespace
 
-void readEmitter(ReadContext& context, TextureReader& textures, pugi::xml_node node) {
-  const std::string type = typeOf(context, node);
-  if (type == "area") context.file.fail(node, "an area emitter must stand inside a shape");
-  if (std::ranges::find(kDeltaTypes, type) != kDeltaTypes.end()) return readDelta(context, node, type);
-  if (type == "constant" || type == "envmap") return readEnvironment(context, textures, node, type);
-  context.unsupported(node, "emitter " + type,
-                      fmt::format("unknown emitter type \"{}\"; known are {}", type, fmt::join(kTypes, ", ")),
-                      "it is left out");
+void EmitterReader::add(pugi::xml_node node) {
+  const std::string type = typeOf(context_, node);
+  if (type == "area") context_.file.fail(node, "an area emitter must stand inside a shape");
+  if (std::ranges::find(kTypes, type) == kTypes.end()) {
+    context_.unsupported(node, "emitter " + type,
+                         fmt::format("unknown emitter type \"{}\"; known are {}", type, fmt::join(kTypes, ", ")),
+                         "it is left out");
+    return;
+  }
+  const Parameters parameters = readEmitterParameters(context_, node, type);
+  if (std::ranges::find(kDeltaTypes, type) != kDeltaTypes.end())
+    addDelta(node, parameters, type);
+  else
+    addDistant(node, parameters, type);
+}
+
+void EmitterReader::addDelta(pugi::xml_node node, const Parameters& parameters, const std::string& type) {
+  const DeltaLight light =
+      makeFrom(context_, node, parameters, [&](const Parameters& p) { return makeDelta(type, p); });
+  if (context_.options.geometry) context_.scene.lights.push_back(light);
+}
+
+void EmitterReader::addDistant(pugi::xml_node node, const Parameters& parameters, const std::string& type) {
+  const bool daylight = DaylightReader::knows(type);
+  if (environment_ || (daylight_.any() && !daylight))
+    context_.file.fail(
+        node, "a second environment: there may be one constant or envmap, or any number of sky, sun and sunsky");
+  if (daylight) return daylight_.add(node, parameters, type);
+  environment_ = true;
+  std::optional<Environment> environment = makeFrom(context_, node, parameters, [&](const Parameters& p) {
+    return type == "constant" ? makeConstant(p) : makeFromImage(context_, textures_, node, p);
+  });
+  if (context_.options.geometry && environment) context_.scene.environment = std::move(environment);
 }
 
 }  // namespace lobe

@@ -1,9 +1,11 @@
 #include "scenes/reader_parameters.h"
 
+#include <cmath>
 #include <optional>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <Eigen/LU>
 
 #include "scenes/transforms.h"
 #include "scenes/values.h"
@@ -111,6 +113,15 @@ void noteUnused(ReadContext& context, pugi::xml_node node, const Parameters& par
 std::string requiredText(const Parameters& parameters, const std::string& name) {
   if (!parameters.has(name)) throw ParameterError("", fmt::format("the parameter \"{}\" is needed", name));
   return parameters.text(name, "");
+}
+
+Eigen::Matrix3f rotationOf(const Parameters& parameters, const char* name) {
+  Eigen::Matrix3d m = parameters.transform(name).topLeftCorner<3, 3>();
+  m /= std::cbrt(std::abs(m.determinant()));
+  // Negated, so that it holds for a singular matrix (NaN).
+  if (!((m.transpose() * m).isIdentity(1e-3)))
+    throw ParameterError(name, fmt::format("{} of an environment must be a rotation", name));
+  return m.cast<float>();
 }
 
 Eigen::Matrix4f toWorld(const Parameters& parameters) {

@@ -48,6 +48,10 @@ auto makeFrom(ReadContext& context, pugi::xml_node node, const Parameters& param
 /// The text parameter that must be there, else a ParameterError.
 std::string requiredText(const Parameters& parameters, const std::string& name);
 
+/// The rotation in a transform of something infinitely far away, where a uniform scale and a translation do not matter.
+/// ParameterError when there is more in it.
+Eigen::Matrix3f rotationOf(const Parameters& parameters, const char* name);
+
 /// As floats, for the world of shapes and cameras.
 Eigen::Matrix4f toWorld(const Parameters& parameters);
 
