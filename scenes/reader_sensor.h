@@ -5,7 +5,7 @@
 
 namespace lobe {
 
-/// Sets camera and pixel filter from a perspective sensor. Throws SceneError.
+/// Sets camera and pixel filter from a sensor. Throws SceneError.
 void readSensor(ReadContext& context, pugi::xml_node node);
 
 /// Takes an integrator's max_depth (also that of an integrator inside) and notes that the rest is ours.

@@ -114,23 +114,40 @@ struct DirectionalLight {
 /// Lights that no ray can hit.
 using DeltaLight = std::variant<PointLight, SpotLight, DirectionalLight>;
 
-/// A pinhole. Local +z is the viewing direction, +y up, +x left (Mitsuba's convention).
+/// A part of a film, in pixels from its top left corner.
+struct FilmCrop {
+  int x, y, width, height;
+};
+
+/// Local +z is the viewing direction, +y up, +x left (Mitsuba's convention). An orthographic camera sees the local x
+/// from −1 to 1, and as much of y as the film's shape makes of it.
 struct Camera {
+  enum class Kind { perspective, thinlens, orthographic } kind = Kind::perspective;
   Eigen::Matrix4f toWorld = Eigen::Matrix4f::Identity();
   float horizontalFov = 60;  ///< degrees, over the full image width (already converted from the file's axis for the
                              ///< size below)
-  int width = 768;
+  int width = 768;           ///< of the film, in pixels
   int height = 576;
+  std::optional<FilmCrop> crop;  ///< what is rendered of it
+  /// A film point shows what the point moved by this much (to the right and down) would show without; fractions of the
+  /// film's width and height.
+  Vec2 shift = Vec2::Zero();
+  float apertureRadius = 0;  ///< of a thin lens, in units of the camera's frame, as is:
+  float focusDistance = 1;   ///< of the plane in focus from the lens, along +z
   /// The field of view as the file states it, to convert again when the size is overridden.
   float fov = 60;
   std::string fovAxis = "x";
+
+  /// The part of the film that becomes the picture.
+  FilmCrop picture() const { return crop.value_or(FilmCrop{0, 0, width, height}); }
 };
 
-/// What kind of reconstruction filter the file asks for; sampled by importance, so each sample touches one pixel.
+/// The reconstruction filter that the file asks for; sampled by importance, so each sample touches one pixel.
 struct PixelFilter {
-  enum class Kind { box, tent, gaussian } kind = Kind::box;
-  float radius = 0.5f;
-  float stddev = 0.5f;
+  enum class Kind { box, tent, gaussian, mitchell, lanczos } kind = Kind::box;
+  float radius = 0.5f;                     ///< pixels
+  float stddev = 0.5f;                     ///< of the Gaussian
+  float b = 1.0f / 3.0f, c = 1.0f / 3.0f;  ///< Mitchell's and Netravali's parameters
 };
 
 struct Scene {

@@ -1,5 +1,6 @@
 // Ray tracing, hits, cameras.
 
+#include "chi2.h"
 #include "render_test_tools.h"
 #include "runtime/render/camera.h"
 
@@ -281,16 +282,83 @@ TEST_CASE("render: the frame follows the bump") {
 TEST_CASE("render: an image is not mirrored") {
   Camera camera;
   camera.width = 200, camera.height = 100, camera.horizontalFov = 90;
-  const PinholeCamera pinhole(camera, {});
+  const RayCamera pinhole(camera, {});
   // Local axes as Mitsuba has them: looking along +z, +x is to the left.
   CHECK((pinhole.rayThrough({100, 50}).direction - Vec3(0, 0, 1)).norm() < 1e-6f);
   CHECK((pinhole.rayThrough({0, 50}).direction - Vec3(1, 0, 1).normalized()).norm() < 1e-6f);
   CHECK((pinhole.rayThrough({100, 0}).direction - Vec3(0, 0.5f, 1).normalized()).norm() < 1e-6f);
   camera.toWorld.col(0) = -camera.toWorld.col(0);
   camera.toWorld(1, 3) = 7;
-  const PinholeCamera turned(camera, {});
+  const RayCamera turned(camera, {});
   CHECK((turned.rayThrough({0, 50}).direction - Vec3(-1, 0, 1).normalized()).norm() < 1e-6f);
   CHECK(turned.rayThrough({0, 50}).origin.y() == 7);
+}
+
+TEST_CASE("render: an orthographic camera sees from −1 to 1 of its frame, along one direction") {
+  Camera camera;
+  camera.kind = Camera::Kind::orthographic;
+  camera.width = 200, camera.height = 100;
+  camera.toWorld.topLeftCorner<3, 3>() *= 3;
+  camera.toWorld(2, 3) = 5;
+  const RayCamera rays(camera, {});
+  CHECK((rays.rayThrough({100, 50}).origin - Vec3(0, 0, 5)).norm() < 1e-5f);
+  CHECK((rays.rayThrough({0, 50}).origin - Vec3(3, 0, 5)).norm() < 1e-5f);
+  CHECK((rays.rayThrough({200, 0}).origin - Vec3(-3, 1.5f, 5)).norm() < 1e-5f);
+  Rng rng(1);
+  for (int x = 0; x < 200; x += 7) CHECK((rays.sample(x, x / 2, rng).direction - Vec3::UnitZ()).norm() < 1e-6f);
+}
+
+TEST_CASE("render: crop and shift move the film") {
+  Camera camera;
+  camera.width = 200, camera.height = 100;
+  camera.kind = GENERATE(Camera::Kind::perspective, Camera::Kind::thinlens, Camera::Kind::orthographic);
+  camera.apertureRadius = 0.1f;
+  const RayCamera whole(camera, {});
+  const Vec2 point(17.3f, 41.2f), lens(0.3f, -0.6f);
+  const auto equal = [](const Ray& a, const Ray& b) {
+    return (a.origin - b.origin).norm() < 1e-5f && (a.direction - b.direction).norm() < 1e-5f;
+  };
+  camera.crop = FilmCrop{30, 20, 64, 48};
+  const RayCamera cropped(camera, {});
+  CHECK(cropped.width() == 64);
+  CHECK(cropped.height() == 48);
+  CHECK(equal(cropped.rayThrough(point, lens), whole.rayThrough(point + Vec2(30, 20), lens)));
+  Rng one(3), other(3);
+  CHECK(equal(cropped.sample(5, 6, one), whole.sample(35, 26, other)));
+  camera.shift = Vec2(0.25f, -0.1f);
+  CHECK(equal(RayCamera(camera, {}).rayThrough(point, lens), whole.rayThrough(point + Vec2(80, 10), lens)));
+}
+
+TEST_CASE("render: a thin lens is sharp in its focus and fills its disc evenly") {
+  Camera camera;
+  camera.kind = Camera::Kind::thinlens;
+  camera.width = 200, camera.height = 100;
+  camera.apertureRadius = 0.5f, camera.focusDistance = 3;
+  camera.toWorld.topLeftCorner<3, 3>() = Eigen::AngleAxisf(0.8f, Vec3(1, 2, 2) / 3).toRotationMatrix();
+  camera.toWorld.topRightCorner<3, 1>() = Vec3(1, 2, 3);
+  const RayCamera rays(camera, {});
+  const Vec3 position = camera.toWorld.topRightCorner<3, 1>();
+  const Eigen::Matrix3f toLocal = camera.toWorld.topLeftCorner<3, 3>().transpose();
+  const Vec2 point(17.3f, 81.2f);
+  const auto onFocus = [&](const Ray& ray) {
+    const Vec3 o = toLocal * (ray.origin - position), d = toLocal * ray.direction;
+    return Vec3(o + d * ((3 - o.z()) / d.z()));
+  };
+  const Vec3 sharp = onFocus(rays.rayThrough(point));
+  camera.kind = Camera::Kind::perspective;
+  CHECK((onFocus(RayCamera(camera, {}).rayThrough(point)) - sharp).norm() < 1e-5f);
+  Rng rng(5);
+  for (int i = 0; i < 100; ++i)
+    CHECK((onFocus(rays.rayThrough(point, squareToDisk(rng.uniform2()))) - sharp).norm() < 1e-5f);
+  const auto draw = [&]() -> std::optional<Eigen::Vector2d> {
+    const Vec3 lens = toLocal * (rays.sample(20, 30, rng).origin - position);
+    if (!(std::abs(lens.z()) < 1e-6f)) return std::nullopt;
+    const double azimuth = std::atan2(lens.y(), lens.x()) / (2 * kPi);
+    return Eigen::Vector2d(lens.head<2>().squaredNorm() / 0.25, azimuth - std::floor(azimuth));
+  };
+  const Chi2Result result = chi2Square(draw, [](const Eigen::Vector2d&) { return 1.0; });
+  INFO(result.message);
+  CHECK(result.passed());
 }
 
 TEST_CASE("render: filters are sampled by their shape") {
@@ -313,20 +381,45 @@ TEST_CASE("render: filters are sampled by their shape") {
   CHECK(deviation(moments({PixelFilter::Kind::tent, 1.0f, 0}), 1.0 / 6) < kMaxDeviation);
   // ∫ x² (g(x) − g(2)) / ∫ (g(x) − g(2)) over [−2, 2] for σ = 0.5.
   CHECK(deviation(moments({PixelFilter::Kind::gaussian, 2.0f, 0.5f}), 0.248571) < kMaxDeviation);
+  // Of the others, where they are positive. Catmull and Rom: 1 − 5/2 x² + 3/2 |x|³ up to 1.
+  CHECK(deviation(moments({PixelFilter::Kind::mitchell, 2.0f, 0, 0.0f, 0.5f}), 2.0 / 13) < kMaxDeviation);
+  const auto second = [](const auto& filter, double radius) {
+    double sum = 0, squares = 0;
+    for (double x = 1e-4; x < radius; x += 2e-4) {
+      sum += std::max(0.0, filter(x));
+      squares += std::max(0.0, filter(x)) * x * x;
+    }
+    return squares / sum;
+  };
+  const auto mitchell = [](double x) {
+    return x < 1 ? 8.0 / 9 - 2 * x * x + 7.0 / 6 * x * x * x
+                 : 16.0 / 9 - 10.0 / 3 * x + 2 * x * x - 7.0 / 18 * x * x * x;
+  };
+  CHECK(deviation(moments({PixelFilter::Kind::mitchell, 2.0f, 0}), second(mitchell, 2)) < kMaxDeviation);
+  const auto lanczos = [](double x) { return 3 * std::sin(kPi * x) * std::sin(kPi * x / 3) / (kPi * kPi * x * x); };
+  CHECK(deviation(moments({PixelFilter::Kind::lanczos, 3.0f, 0}), second(lanczos, 3)) < kMaxDeviation);
 }
 
 TEST_CASE("render: cameras without meaning are refused") {
   Camera camera;
   SECTION("field of view") {
     camera.horizontalFov = 180;
-    CHECK_THROWS_WITH(PinholeCamera(camera, {}), Catch::Contains("field of view"));
+    CHECK_THROWS_WITH(RayCamera(camera, {}), Catch::Contains("field of view"));
   }
   SECTION("size") {
     camera.width = 0;
-    CHECK_THROWS_WITH(PinholeCamera(camera, {}), Catch::Contains("0x576"));
+    CHECK_THROWS_WITH(RayCamera(camera, {}), Catch::Contains("0x576"));
+  }
+  SECTION("crop") {
+    camera.crop = FilmCrop{700, 0, 69, 10};
+    CHECK_THROWS_WITH(RayCamera(camera, {}), Catch::Contains("69x10") && Catch::Contains("768x576"));
+  }
+  SECTION("lens") {
+    camera.focusDistance = 0;
+    CHECK_THROWS_WITH(RayCamera(camera, {}), Catch::Contains("focus"));
   }
   SECTION("matrix") {
     camera.toWorld.setZero();
-    CHECK_THROWS_WITH(PinholeCamera(camera, {}), Catch::Contains("to_world"));
+    CHECK_THROWS_WITH(RayCamera(camera, {}), Catch::Contains("to_world"));
   }
 }

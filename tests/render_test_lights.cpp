@@ -209,7 +209,7 @@ TEST_CASE("render: what emitter sampling does alone is not learnt") {
   const RenderScene ready(scene);
   const IlluminationCache nothing;
   const GuidedSampler sampler(scene, nothing, nullptr);
-  const PinholeCamera camera({}, {});
+  const RayCamera camera({}, {});
   const auto particles = [&](const RenderScene& s) {
     return ParticleTracer(s, camera, sampler, nullptr, 1).tracePhotons(0, 2000).size();
   };

@@ -274,7 +274,7 @@ TEST_CASE("render: an image depends on the seed, not on threads or waves") {
   Camera camera;
   camera.width = 37, camera.height = 21;
   camera.toWorld.topRightCorner<3, 1>() = Vec3(0, 1.5f, -1.9f);
-  const PinholeCamera pinhole(camera, {});
+  const RayCamera pinhole(camera, {});
   const PathIntegrator integrator(ready, {});
   const auto image = [&](int threads, std::uint64_t seed) {
     const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism, threads);
@@ -315,7 +315,7 @@ TEST_CASE("render: a deadline is kept") {
   options.seconds = 0.5;
   int waves = 0;
   const auto count = [&](const RenderProgress&) { ++waves; };
-  const RenderResult result = render(PinholeCamera(camera, {}), PathIntegrator(ready, {}), film, options, count);
+  const RenderResult result = render(RayCamera(camera, {}), PathIntegrator(ready, {}), film, options, count);
   CHECK(result.total.seconds < 0.75);  // generous: other work may run beside the test
   CHECK(result.total.seconds > 0.25);
   CHECK(waves > 5);

@@ -267,7 +267,7 @@ TEST_CASE("scenes: film, filter, depth, and notes of what is replaced") {
   const Scene scene = readText(
       "<scene><integrator type=\"aov\"><integrator type=\"path\"><integer name=\"maxDepth\" value=\"7\"/></integrator>"
       "</integrator><sensor type=\"perspective\"><sampler type=\"sobol\"/><film type=\"hdrfilm\">"
-      "<boolean name=\"banner\" value=\"false\"/><rfilter type=\"mitchell\"/></film></sensor></scene>");
+      "<boolean name=\"banner\" value=\"false\"/><rfilter type=\"windowed\"/></film></sensor></scene>");
   CHECK(scene.maxDepth == 7);
   CHECK(scene.filter.kind == PixelFilter::Kind::gaussian);
   CHECK(scene.filter.radius == 2.0f);
@@ -338,6 +338,40 @@ TEST_CASE("scenes: point, spot and directional lights") {
   CHECK(std::get<DirectionalLight>(scene.lights[3]).direction.isApprox(Vec3(0, -1, 0)));
   CHECK((std::get<DirectionalLight>(scene.lights[3]).irradiance == 2.0f).all());
   CHECK(std::get<DirectionalLight>(scene.lights[4]).direction.isApprox(Vec3(1, 0, 0), 1e-5f));
+}
+
+TEST_CASE("scenes: thin lenses, orthographic cameras, crops, shifts and filters") {
+  const auto sensor = [](const std::string& type, const std::string& body) {
+    return readText("<scene><sensor type=\"" + type + "\">" + body + "</sensor></scene>");
+  };
+  const std::string aperture = "<float name=\"apertureRadius\" value=\"0.25\"/><float name=\"fov\" value=\"40\"/>";
+  const Scene lens = sensor("thinlens", aperture + "<float name=\"focusDistance\" value=\"7\"/>");
+  CHECK(lens.camera.kind == Camera::Kind::thinlens);
+  CHECK(lens.camera.apertureRadius == 0.25f);
+  CHECK(lens.camera.focusDistance == 7.0f);
+  CHECK(lens.camera.horizontalFov == Approx(40));
+  CHECK(lens.notes.empty());
+  CHECK(sensor("thinlens", aperture).camera.focusDistance == 1e4f);
+  CHECK(sensor("thinlens", aperture + "<float name=\"farClip\" value=\"50\"/>").camera.focusDistance == 50.0f);
+  const Scene flat = sensor("orthographic", "<transform name=\"toWorld\"><scale x=\"10\" y=\"10\"/></transform>");
+  CHECK(flat.camera.kind == Camera::Kind::orthographic);
+  CHECK(flat.camera.toWorld(0, 0) == 10.0f);
+
+  const Scene cropped =
+      sensor("perspective",
+             "<float name=\"principal_point_offset_x\" value=\"0.1\"/><float name=\"principal_point_offset_y\" "
+             "value=\"-0.2\"/>"
+             "<film type=\"ldrfilm\"><integer name=\"width\" value=\"100\"/><integer name=\"height\" value=\"50\"/>"
+             "<integer name=\"cropOffsetX\" value=\"10\"/><integer name=\"cropWidth\" value=\"20\"/>"
+             "<float name=\"gamma\" value=\"2.2\"/><float name=\"exposure\" value=\"1\"/>"
+             "<rfilter type=\"mitchell\"><float name=\"B\" value=\"0.2\"/></rfilter></film>");
+  CHECK(cropped.camera.shift == Vec2(0.1f, -0.2f));
+  const FilmCrop picture = cropped.camera.picture();
+  CHECK(std::array{picture.x, picture.y, picture.width, picture.height} == std::array{10, 0, 20, 50});
+  CHECK(cropped.notes == std::vector<std::string>{"film \"ldrfilm\": no effect of exposure, gamma"});
+  CHECK(cropped.filter.kind == PixelFilter::Kind::mitchell);
+  CHECK(cropped.filter.b == 0.2f);
+  CHECK(cropped.filter.c == Approx(1.0 / 3));
 }
 
 TEST_CASE("scenes: bitmaps with wrap modes, scales, filters and encodings") {

@@ -46,12 +46,13 @@ TEST_CASE("scenes: unknown elements and types are told with what is known") {
   checkFault(faultOf("<shape type=\"torus\"/>"), "2:1",
              {"\"torus\"", "cube, cylinder, disk, instance, obj, ply, rectangle, serialized, shapegroup, sphere"});
   checkFault(faultOf("<emitter type=\"laser\"/>"), "2:1",
-             {"\"laser\"", "area, constant, directional, envmap, point, spot"});
+             {"\"laser\"", "area, constant, directional, envmap, point, sky, spot, sun, sunsky"});
   checkFault(faultOf("<emitter type=\"area\"/>"), "2:1", {"inside a shape"});
   checkFault(faultOf("<shape type=\"disk\"><emitter type=\"spot\"/></shape>"), "2:20", {"\"spot\"", "area"});
   checkFault(faultOf("<texture type=\"wood\"/>"), "2:1", {"\"wood\"", "bitmap, checkerboard, scale"});
   checkFault(faultOf("<shape/>"), "2:1", {"type"});
-  checkFault(faultOfText("<scene><sensor type=\"thinlens\"/></scene>"), "1:8", {"\"thinlens\"", "perspective"});
+  checkFault(faultOfText("<scene><sensor type=\"fisheye\"/></scene>"), "1:8",
+             {"\"fisheye\"", "perspective, thinlens, orthographic"});
   checkFault(faultOf("<shape type=\"disk\"><transform name=\"to_world\"><shear/></transform></shape>"), "2:47",
              {"<shear>", "translate, scale, rotate, lookat, matrix"});
   checkFault(faultOfText("<scene/>"), "1:1", {"sensor"});
@@ -127,6 +128,48 @@ TEST_CASE("scenes: emitters without meaning are refused") {
   checkFault(fault("directional", "<vector name=\"direction\" x=\"1\"/><transform name=\"toWorld\"/>"), "3:35",
              {"direction", "to_world"});
   checkFault(fault("point", "<float name=\"power\" value=\"1\"/>"), "3:3", {"\"power\"", "intensity"});
+}
+
+TEST_CASE("scenes: skies without meaning are refused") {
+  const auto fault = [](const std::string& type, const std::string& body) {
+    return faultOf("<emitter type=\"" + type + "\">\n  " + body + "</emitter>");
+  };
+  const std::string down = "<vector name=\"sunDirection\" x=\"1\" y=\"-1\"/>";
+  for (const std::string type : {"sky", "sun", "sunsky"}) {
+    checkFault(fault(type, down), "3:3", {"45.0 degrees below the horizon"});
+    checkFault(fault(type, "<float name=\"hour\" value=\"23\"/>"), "3:3", {"below the horizon"});
+    checkFault(fault(type, "<float name=\"turbidity\" value=\"11\"/>"), "3:3", {"turbidity", "1 to 10", "11"});
+    checkFault(fault(type, "<float name=\"scale\" value=\"-1\"/>"), "3:3", {"scale", "negative"});
+    checkFault(fault(type, "<float name=\"stretch\" value=\"3\"/>"), "3:3", {"stretch", "1 to 2"});
+    checkFault(fault(type, "<integer name=\"month\" value=\"13\"/>"), "3:3", {"month", "1 to 12"});
+    checkFault(fault(type, "<vector name=\"sunDirection\" y=\"1\"/><float name=\"hour\" value=\"9\"/>"), "3:38",
+               {"sun_direction", "hour"});
+    checkFault(fault(type, "<float name=\"haze\" value=\"1\"/>"), "3:3", {"\"haze\"", "turbidity"});
+    checkFault(faultOf("<emitter type=\"constant\"/>\n<emitter type=\"" + type + "\"/>"), "3:1",
+               {"second environment"});
+    checkFault(faultOf("<emitter type=\"" + type + "\"/>\n<emitter type=\"constant\"/>"), "3:1",
+               {"second environment"});
+  }
+  checkFault(fault("sunsky", "<float name=\"sunScale\" value=\"-1\"/>"), "3:3", {"sun_scale", "negative"});
+  checkFault(fault("sun", "<float name=\"sunRadiusScale\" value=\"1e3\"/>"), "3:3", {"sun_radius_scale"});
+}
+
+TEST_CASE("scenes: cameras and crops without meaning are refused") {
+  const auto fault = [](const std::string& type, const std::string& body) {
+    return faultOfText("<scene><sensor type=\"" + type + "\">\n" + body + "</sensor></scene>");
+  };
+  checkFault(fault("thinlens", ""), "1:8", {"aperture_radius"});
+  checkFault(fault("thinlens", "<float name=\"apertureRadius\" value=\"-1\"/>"), "2:1", {"aperture_radius", "-1"});
+  checkFault(
+      fault("thinlens", "<float name=\"apertureRadius\" value=\"1\"/>\n<float name=\"focusDistance\" value=\"0\"/>"),
+      "3:1", {"focus_distance", "0"});
+  checkFault(fault("orthographic", "<float name=\"fov\" value=\"40\"/>"), "2:1", {"\"fov\""});
+  const std::string film = "<film type=\"hdrfilm\"><integer name=\"width\" value=\"100\"/>\n";
+  checkFault(fault("perspective", film + "<integer name=\"cropOffsetX\" value=\"100\"/></film>"), "3:1",
+             {"crop_offset_x", "0 to 99"});
+  checkFault(fault("perspective", film + "<integer name=\"cropWidth\" value=\"91\"/>"
+                                         "<integer name=\"cropOffsetX\" value=\"10\"/></film>"),
+             "3:1", {"crop_width", "1 to 90", "91"});
 }
 
 TEST_CASE("scenes: missing and damaged files are told with both names") {

@@ -69,7 +69,7 @@ class Studio {
   lobe::test::Folder folder_;
   Scene scene_;
   std::optional<RenderScene> renderScene_;
-  std::optional<PinholeCamera> camera_;
+  std::optional<RayCamera> camera_;
   std::optional<BrdfCaches> caches_;
   IlluminationCache illumination_;
   std::optional<GuidedSampler> guided_, product_;

@@ -115,7 +115,7 @@ float directShare(const EmittedPhoton& photon, const SurfaceHit& hit) {
 
 }  // namespace
 
-ParticleTracer::ParticleTracer(const RenderScene& scene, const PinholeCamera& camera, const GuidedSampler& sampler,
+ParticleTracer::ParticleTracer(const RenderScene& scene, const RayCamera& camera, const GuidedSampler& sampler,
                                const EnvironmentGuide* guide, std::uint64_t seed)
     : scene_(scene), camera_(camera), sampler_(sampler), guide_(guide), seed_(seed) {}
 

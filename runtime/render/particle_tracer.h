@@ -28,7 +28,7 @@ struct ImportonResult {
 class ParticleTracer {
  public:
   /// All outlive it. guide: nullptr without an environment.
-  ParticleTracer(const RenderScene& scene, const PinholeCamera& camera, const GuidedSampler& sampler,
+  ParticleTracer(const RenderScene& scene, const RayCamera& camera, const GuidedSampler& sampler,
                  const EnvironmentGuide* guide, std::uint64_t seed);
 
   ImportonResult traceImportons(int pass, int count) const;
@@ -43,7 +43,7 @@ class ParticleTracer {
   std::optional<EmittedPhoton> emit(Rng& rng) const;
 
   const RenderScene& scene_;
-  const PinholeCamera& camera_;
+  const RayCamera& camera_;
   const GuidedSampler& sampler_;
   const EnvironmentGuide* guide_;
   std::uint64_t seed_;

@@ -72,6 +72,8 @@ Scene readFor(const RenderJob& job) {
       readScene(job.scene, {job.definitions, job.lenient, true, [&](double share) { progress.advance(share); }});
   for (const std::string& warning : scene.warnings) printWarning(kTool, warning);
   if (job.size) {
+    if (scene.camera.crop) printWarning(kTool, "--size is that of the whole film: the file's crop is dropped");
+    scene.camera.crop.reset();
     scene.camera.width = job.size->first;
     scene.camera.height = job.size->second;
     scene.camera.horizontalFov = horizontalFov(scene.camera, scene.camera.width, scene.camera.height);
@@ -85,11 +87,11 @@ class ConvergenceLog {
   explicit ConvergenceLog(const RenderJob& job, const Scene& scene) : file_(job.convergence) {
     if (job.reference.empty()) return;
     reference_ = readImage(job.reference);
-    if (reference_->width != scene.camera.width || reference_->height != scene.camera.height)
+    const FilmCrop picture = scene.camera.picture();
+    if (reference_->width != picture.width || reference_->height != picture.height)
       throw std::runtime_error(fmt::format("{}: the reference has {}x{} pixels, the picture {}x{}; use --size {}x{}",
-                                           job.reference.string(), reference_->width, reference_->height,
-                                           scene.camera.width, scene.camera.height, reference_->width,
-                                           reference_->height));
+                                           job.reference.string(), reference_->width, reference_->height, picture.width,
+                                           picture.height, reference_->width, reference_->height));
   }
 
   void add(const Film& film, double seconds, int samples) {
@@ -191,7 +193,7 @@ ImageAttributes attributes(const RenderJob& job, const RunResult& run) {
   return all;
 }
 
-void prepare(const RenderJob& job, const RenderScene& scene, const PinholeCamera& camera, Guiding& guiding) {
+void prepare(const RenderJob& job, const RenderScene& scene, const RayCamera& camera, Guiding& guiding) {
   if (job.integrator == IntegratorKind::path) return;
   TrainingPlan plan = job.training;
   plan.seed = job.seed;
@@ -215,7 +217,7 @@ RenderOptions renderOptions(const RenderJob& job, double trained) {
   return options;
 }
 
-RenderResult renderWithProgress(const RenderJob& job, const PinholeCamera& camera, const Integrator& integrator,
+RenderResult renderWithProgress(const RenderJob& job, const RayCamera& camera, const Integrator& integrator,
                                 double trained, Film& film, ConvergenceLog& log) {
   Progress progress("rendering", job.samples ? *job.samples : *job.seconds - trained);
   double done = 0;
@@ -272,7 +274,7 @@ void run(const RenderJob& job) {
   const RenderScene renderScene(scene);
   load.building = building.seconds();
   load.embree = renderScene.tracer.buildSeconds();
-  const PinholeCamera camera(scene.camera, scene.filter);
+  const RayCamera camera(scene.camera, scene.filter);
   prepare(job, renderScene, camera, guiding);
 
   const std::unique_ptr<Integrator> integrator = makeIntegrator(job, renderScene, guiding);

@@ -22,7 +22,7 @@ struct Wave {
 
 class WaveRenderer {
  public:
-  WaveRenderer(const PinholeCamera& camera, const Integrator& integrator, Film& film, std::uint64_t seed)
+  WaveRenderer(const RayCamera& camera, const Integrator& integrator, Film& film, std::uint64_t seed)
       : camera_(camera), integrator_(integrator), film_(film), seed_(seed) {
     columns_ = (film.width() + kTileSize - 1) / kTileSize;
     tiles_ = columns_ * ((film.height() + kTileSize - 1) / kTileSize);
@@ -61,7 +61,7 @@ class WaveRenderer {
     }
   }
 
-  const PinholeCamera& camera_;
+  const RayCamera& camera_;
   const Integrator& integrator_;
   Film& film_;
   std::uint64_t seed_;
@@ -104,7 +104,7 @@ void RenderOptions::validate() const {
   if (seconds && !(*seconds > 0.0)) throw std::runtime_error(fmt::format("seconds: {} is not positive", *seconds));
 }
 
-RenderResult render(const PinholeCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options,
+RenderResult render(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options,
                     const AfterWave& afterWave) {
   using Clock = std::chrono::steady_clock;
   options.validate();

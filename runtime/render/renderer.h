@@ -36,7 +36,7 @@ struct RenderResult {
 
 /// Adds samples to the film, which has the camera's size and is empty. Sample s of pixel i draws from the random stream
 /// (seed, i, s).
-RenderResult render(const PinholeCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options,
+RenderResult render(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options,
                     const AfterWave& afterWave = {});
 
 }  // namespace lobe

@@ -16,7 +16,7 @@ void TrainingPlan::validate() const {
   records.validate();
 }
 
-TrainedIllumination trainIllumination(const RenderScene& scene, const PinholeCamera& camera, const BrdfCaches* caches,
+TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera& camera, const BrdfCaches* caches,
                                       const TrainingPlan& plan, const std::function<void(int)>& afterPass) {
   using Clock = std::chrono::steady_clock;
   plan.validate();

@@ -33,7 +33,7 @@ struct TrainedIllumination {
 };
 
 /// caches: for the product; nullptr: paths in training are guided by illumination only. afterPass: passes done so far.
-TrainedIllumination trainIllumination(const RenderScene& scene, const PinholeCamera& camera, const BrdfCaches* caches,
+TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera& camera, const BrdfCaches* caches,
                                       const TrainingPlan& plan, const std::function<void(int)>& afterPass = {});
 
 }  // namespace lobe
