@@ -134,9 +134,18 @@ struct Moments {
   double relativeVariance() const { return first > 0 ? std::max(0.0, second / (first * first) - 1) : 0; }
 };
 
+/// The largest of the ratios it is shown.
+struct Worst {
+  double ratio = 0;
+  Vec3 wi = Vec3::UnitZ();
+  void visit(double r, const Vec3& w) {
+    if (r > ratio) ratio = r, wi = w;
+  }
+};
+
 /// ∫ f and ∫ f²/p from points of G, times `share`. G is drawn in place of G cosθ/A and weighted by cosθ/A.
 Moments fromMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> mixture, const GradedDensity& p,
-                    std::uint32_t samples) {
+                    std::uint32_t samples, Worst& worst) {
   Moments sum;
   for (std::uint32_t i = 0; i < samples; ++i) {
     const Eigen::Vector3f u = cubePoint(i);
@@ -146,6 +155,7 @@ Moments fromMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> 
     const double density = p(wi);
     if (!(density > 0)) continue;
     const double ratio = evaluate(lobe, wo, wi) * wi.z() / density, weight = wi.z() / p.cosineMass();
+    worst.visit(ratio, wi);
     sum.first += weight * ratio / samples;
     sum.second += weight * ratio * ratio / samples;
   }
@@ -156,18 +166,21 @@ Moments fromMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> 
 
 Quality gradeMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> mixture, std::uint32_t samples) {
   const GradedDensity p(lobe, wo, mixture);
+  Worst worst;
   Moments own, covered;  // own: drawn from q as a part of p; covered: ∫ f and ∫ f²/p by importance sampling from q
   for (const Draw& d : drawFromLobe(lobe, wo, samples, samples)) {
     const double f = d.value * d.wi.z(), ratio = f / p(d.wi, d.pdf);
+    worst.visit(ratio, d.wi);
     own.first += ratio / samples;
     own.second += ratio * ratio / samples;
     covered.first += f / d.pdf / samples;
     covered.second += f * ratio / d.pdf / samples;
   }
-  const Moments guided = fromMixture(lobe, wo, mixture, p, samples);
+  const Moments guided = fromMixture(lobe, wo, mixture, p, samples, worst);
   constexpr double beta = kDefensiveShare;
   const Moments drawn{beta * own.first + (1 - beta) * guided.first, beta * own.second + (1 - beta) * guided.second};
-  return {drawn.relativeVariance(), covered.relativeVariance()};
+  const double worstRatio = drawn.first > 0 ? worst.ratio / drawn.first : 0;
+  return {drawn.relativeVariance(), covered.relativeVariance(), worstRatio, worst.wi};
 }
 
 FittedRecord fitLobe(const Lobe& lobe, const Vec3& wo, const FitSettings& settings) {
@@ -189,6 +202,7 @@ FittedRecord fitLobe(const Lobe& lobe, const Vec3& wo, const FitSettings& settin
   r.outside = static_cast<float>(std::clamp(1 - mass.inside, 0.0, 1.0));
   r.nev = static_cast<float>(quality.nev);
   r.nevCoverage = static_cast<float>(quality.coverage);
+  r.worstRatio = static_cast<float>(quality.worst);
   return fitted;
 }
 

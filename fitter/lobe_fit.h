@@ -22,6 +22,8 @@ inline constexpr double kDefensiveShare = 0.1;
 struct Quality {
   double nev;       ///< drawn from p
   double coverage;  ///< the same quantity drawn from q, which also sees what the mixture misses
+  double worst;     ///< largest f/p of all points visited, in units of ∫ f dω; 0 where nothing is reflected
+  Vec3 worstAt;     ///< wi of that point; the normal where nothing is reflected
 };
 
 /// Grades any mixture over the disc (weights sum to one) with `samples` points of each density. The points are none of

@@ -60,6 +60,7 @@ Json recordJson(const LobeCache& cache, const DirectionGrid& grid, std::size_t i
             {"outside", number(r.outside)},
             {"nev", number(r.nev)},
             {"nev_coverage", number(r.nevCoverage)},
+            {"worst_ratio", number(r.worstRatio)},
             {"components", Json::array()}};
   for (const CacheComponent& c : cache.components(r))
     json["components"].push_back({{"weight", number(c.weight)},
@@ -76,6 +77,7 @@ CacheSummary summarise(const LobeCache& cache) {
   for (const CacheRecord& r : cache.records()) {
     s.meanComponents += r.count;
     s.outside += r.outside;
+    s.worstRatio = std::max(s.worstRatio, static_cast<double>(r.worstRatio));
     nev.push_back(r.nev);
     coverage.push_back(r.nevCoverage);
   }
@@ -96,7 +98,8 @@ std::string abbreviated(const std::vector<std::string>& names) {
 }
 
 void printReports(const std::vector<CacheReport>& reports, bool showRun, std::FILE* out) {
-  std::vector<std::string> header{"lobe", "records", "comp.", "NEV", "worst", "coverage", "worst", "outside", "bytes"};
+  std::vector<std::string> header{"lobe",     "records", "comp.",     "NEV",     "worst",
+                                  "coverage", "worst",   "worst f/p", "outside", "bytes"};
   if (showRun) {
     header.insert(header.begin(), "material");
     header.insert(header.end() - 1, "seconds");
@@ -111,6 +114,7 @@ void printReports(const std::vector<CacheReport>& reports, bool showRun, std::FI
                                    fmt::format("{:.3f}", s.nevWorst),
                                    fmt::format("{:.3f}", s.coverageMedian),
                                    fmt::format("{:.3f}", s.coverageWorst),
+                                   fmt::format("{:.2f}", s.worstRatio),
                                    percent(s.outside),
                                    std::to_string(s.bytes)};
     if (showRun) {
@@ -129,6 +133,7 @@ Json toJson(const CacheSummary& s) {
           {"nev_worst", s.nevWorst},
           {"nev_coverage_median", s.coverageMedian},
           {"nev_coverage_worst", s.coverageWorst},
+          {"worst_ratio", s.worstRatio},
           {"outside", s.outside},
           {"bytes", s.bytes}};
 }
@@ -181,15 +186,15 @@ void printHeader(const LobeCache& cache, const std::filesystem::path& path, std:
 
 void printRecords(const LobeCache& cache, std::FILE* out) {
   const DirectionGrid grid = gridOf(cache);
-  Table table(
-      {"record", "elevation", "azimuth", "comp.", "integral", "albedo", "cosine mass", "outside", "NEV", "coverage"});
+  Table table({"record", "elevation", "azimuth", "comp.", "integral", "albedo", "cosine mass", "outside", "NEV",
+               "coverage", "worst f/p"});
   for (std::size_t i = 0; i < cache.records().size(); ++i) {
     const CacheRecord& r = cache.records()[i];
     const Angles angles = anglesOf(grid.direction(static_cast<int>(i)));
     table.add({std::to_string(i), fmt::format("{:.2f}", angles.elevation), fmt::format("{:.2f}", angles.azimuth),
                std::to_string(r.count), fmt::format("{:.5g}", r.integral), fmt::format("{:.5f}", r.albedo),
                fmt::format("{:.5f}", r.cosineMass), percent(r.outside), fmt::format("{:.4f}", r.nev),
-               fmt::format("{:.4f}", r.nevCoverage)});
+               fmt::format("{:.4f}", r.nevCoverage), fmt::format("{:.3f}", r.worstRatio)});
   }
   table.print(out);
 }

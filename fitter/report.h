@@ -18,6 +18,7 @@ struct CacheSummary {
   double meanComponents = 0;
   double nevMedian = 0, nevWorst = 0;            ///< drawn from the graded density
   double coverageMedian = 0, coverageWorst = 0;  ///< the same quantity drawn from the lobe's own sampler
+  double worstRatio = 0;                         ///< largest f/p of all records
   double outside = 0;                            ///< mean share of the mixtures outside the disc
   std::size_t bytes = 0;                         ///< of the file
 };

@@ -49,8 +49,10 @@ void checkRecord(const CacheRecord& r, std::size_t index, std::span<const CacheC
   const auto require = [&](bool condition, const char* fault) {
     if (!condition) refuse(name, fmt::format("record {}: {}", index, fault));
   };
-  require(finite({r.integral, r.albedo, r.cosineMass, r.outside, r.nev, r.nevCoverage}), "a number is not finite");
-  require(r.integral >= 0 && r.albedo >= 0 && r.nev >= 0 && r.nevCoverage >= 0, "a negative quantity");
+  require(finite({r.integral, r.albedo, r.cosineMass, r.outside, r.nev, r.nevCoverage, r.worstRatio}),
+          "a number is not finite");
+  require(r.integral >= 0 && r.albedo >= 0 && r.nev >= 0 && r.nevCoverage >= 0 && r.worstRatio >= 0,
+          "a negative quantity");
   require(r.cosineMass > 0 && r.cosineMass <= 1.0001f, "cosine mass out of range");
   require(r.outside >= 0 && r.outside <= 1, "share outside the disc out of range");
   require(r.count >= 1 && r.count <= kMaxCacheComponents, "number of components out of range");

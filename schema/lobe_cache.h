@@ -18,7 +18,7 @@ struct CacheComponent {
 };
 struct CacheRecord {
   std::uint32_t first, count;
-  float integral, albedo, cosineMass, outside, nev, nevCoverage;
+  float integral, albedo, cosineMass, outside, nev, nevCoverage, worstRatio;
 };
 
 struct FitSettings {

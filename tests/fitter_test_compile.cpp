@@ -104,8 +104,9 @@ TEST_CASE("fitter: the summary of a cache is that of its records") {
   info.gridCount = 3;
   const CacheComponent c{1, 0, 0, 0.1f, 0, 0.1f};
   const CacheComponent half{0.5f, 0, 0, 0.1f, 0, 0.1f};
-  const std::vector<CacheRecord> records{
-      {0, 1, 1, 1, 0.5f, 0.1f, 0.3f, 0.4f}, {1, 2, 1, 1, 0.5f, 0.3f, 0.1f, 0.6f}, {0, 1, 1, 1, 0.5f, 0.2f, 0.2f, 0.5f}};
+  const std::vector<CacheRecord> records{{0, 1, 1, 1, 0.5f, 0.1f, 0.3f, 0.4f, 2.0f},
+                                         {1, 2, 1, 1, 0.5f, 0.3f, 0.1f, 0.6f, 5.0f},
+                                         {0, 1, 1, 1, 0.5f, 0.2f, 0.2f, 0.5f, 3.0f}};
   writeAtomically(folder / "x.lobe", encodeLobeCache(info, records, std::vector{c, half, half}));
   const CacheSummary s = summarise(LobeCache::open(folder / "x.lobe"));
   CHECK(s.records == 3);
@@ -114,6 +115,7 @@ TEST_CASE("fitter: the summary of a cache is that of its records") {
   CHECK(s.nevWorst == Approx(0.3));
   CHECK(s.coverageMedian == Approx(0.5));
   CHECK(s.coverageWorst == Approx(0.6));
+  CHECK(s.worstRatio == Approx(5));
   CHECK(s.outside == Approx(0.2));
 }
 

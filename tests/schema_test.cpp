@@ -52,7 +52,7 @@ Content smallCache() {
   c.info.modelRevision = 3;
   c.info.gridKind = 0;
   c.info.gridCount = 2;
-  c.records = {{0, 1, 1.5f, 0.75f, 0.5f, 0.01f, 0.2f, 0.3f}, {1, 2, 1.25f, 0.5f, 0.25f, 0.02f, 0.4f, 0.6f}};
+  c.records = {{0, 1, 1.5f, 0.75f, 0.5f, 0.01f, 0.2f, 0.3f, 1.5f}, {1, 2, 1.25f, 0.5f, 0.25f, 0.02f, 0.4f, 0.6f, 3.0f}};
   c.components = {{1.0f, 0.1f, 0.2f, 0.03f, 0.01f, 0.04f},
                   {0.25f, -0.1f, 0.3f, 0.02f, 0.0f, 0.05f},
                   {0.75f, 0.4f, -0.2f, 0.01f, -0.005f, 0.06f}};
@@ -125,10 +125,11 @@ TEST_CASE("schema: fields in place are those of the FlatBuffers schema") {
   const auto fc = std::bit_cast<fb::Component>(c);
   CHECK((fc.weight() == 1 && fc.mean_x() == 2 && fc.mean_y() == 3));
   CHECK((fc.cov_xx() == 4 && fc.cov_xy() == 5 && fc.cov_yy() == 6));
-  const CacheRecord r{1, 2, 3, 4, 5, 6, 7, 8};
+  const CacheRecord r{1, 2, 3, 4, 5, 6, 7, 8, 9};
   const auto fr = std::bit_cast<fb::Record>(r);
   CHECK((fr.first() == 1 && fr.count() == 2 && fr.integral() == 3 && fr.albedo() == 4));
   CHECK((fr.cosine_mass() == 5 && fr.outside() == 6 && fr.nev() == 7 && fr.nev_coverage() == 8));
+  CHECK(fr.worst_ratio() == 9);
 }
 
 TEST_CASE("schema: every flipped bit and every truncation is refused") {
@@ -225,7 +226,9 @@ TEST_CASE("schema: faults of meaning are refused") {
       {"number of components", [](Content& c) { c.records[0].count = 0; }},
       {"number of components", [](Content& c) { c.records[0].count = kMaxCacheComponents + 1; }},
       {"not finite", [&](Content& c) { c.records[0].nev = nan; }},
+      {"not finite", [&](Content& c) { c.records[0].worstRatio = nan; }},
       {"negative quantity", [](Content& c) { c.records[0].integral = -1; }},
+      {"negative quantity", [](Content& c) { c.records[1].worstRatio = -1; }},
       {"outside the disc", [](Content& c) { c.records[0].outside = 1.5f; }},
       {"cosine mass", [](Content& c) { c.records[0].cosineMass = 0; }},
       {"records for a grid", [](Content& c) { c.info.gridCount = 3; }},
