@@ -90,13 +90,14 @@ const auto& lookUp(const Table& table, std::string_view parameter, const std::st
                        fmt::format("unknown {} \"{}\"; known are a number, or {}", parameter, wanted, known));
 }
 
-/// A spectrum fitted by three numbers may have overshot: negative ones become zero, the closest that can be.
-Rgb readNotNegative(const Parameters& parameters, std::string_view name, const float (&preset)[3]) {
+/// A spectrum fitted by three numbers may have overshot. Fresnel's formulas hold squares of both only, so that other
+/// renderers take such numbers without their sign; the picture is to be theirs.
+Rgb readUnsigned(const Parameters& parameters, std::string_view name, const float (&preset)[3]) {
   const Rgb colour = parameters.colour(name, Rgb(preset[0], preset[1], preset[2]));
   if (!colour.allFinite()) throw ParameterError(std::string(name), fmt::format("{} must be finite", name));
   if ((colour < 0.0f).any())
-    parameters.note(fmt::format("negative {} {}, {}, {} is taken as zero", name, colour.x(), colour.y(), colour.z()));
-  return colour.max(0.0f);
+    parameters.note(fmt::format("{} {}, {}, {} is taken without its signs", name, colour.x(), colour.y(), colour.z()));
+  return colour.abs();
 }
 
 }  // namespace
@@ -116,8 +117,8 @@ double readRelativeIor(const Parameters& parameters, std::string_view interiorFa
 ComplexIor readConductor(const Parameters& parameters) {
   const NamedConductor& preset = lookUp(kConductors, "material", parameters.text("material", "Cu"));
   const float outside = static_cast<float>(readIor(parameters, "ext_eta", "air"));
-  const Rgb eta = readNotNegative(parameters, "eta", preset.eta);
-  return {eta / outside, readNotNegative(parameters, "k", preset.k) / outside};
+  const Rgb eta = readUnsigned(parameters, "eta", preset.eta);
+  return {eta / outside, readUnsigned(parameters, "k", preset.k) / outside};
 }
 
 }  // namespace lobe
