@@ -2,6 +2,7 @@
 // Parameters that say how much something emits.
 
 #include "materials/parameters.h"
+#include "scenes/read_context.h"
 
 namespace lobe {
 
@@ -9,5 +10,8 @@ namespace lobe {
 Rgb emission(const Parameters& parameters, const char* name, const Rgb& fallback);
 TexturePtr emissionTexture(const Parameters& parameters, const char* name, const Rgb& fallback);
 double emissionScale(const Parameters& parameters, const char* name, double fallback);
+
+/// Lights are chosen by power, whatever the file would have: sampling_weight is noted as of no effect.
+void noteSamplingWeight(ReadContext& context, pugi::xml_node node, const Parameters& parameters);
 
 }  // namespace lobe

@@ -91,11 +91,7 @@ Parameters readEmitterParameters(ReadContext& context, pugi::xml_node node, cons
     return true;
   };
   Parameters parameters = readParameters(context, node, "", refuseTexture);
-  // Lights are chosen by power, whatever the file would have.
-  if (parameters.has("sampling_weight")) {
-    parameters.number("sampling_weight", 1.0);
-    context.note(fmt::format("{}: no effect of sampling_weight", describe(node)));
-  }
+  noteSamplingWeight(context, node, parameters);
   return parameters;
 }
 

@@ -77,7 +77,8 @@ TEST_CASE("scenes: scenes from elsewhere") {
   const Known known = GENERATE(Known{"living-room", 65, 19, 0, true}, Known{"dining-room", 53, 15, 0, true},
                                Known{"veach-mis", 9, 6, 3, false}, Known{"cornell-box", 8, 8, 1, false},
                                Known{"veach-ajar", 16, 10, 1, false}, Known{"veach-bidir", 14, 4, 2, false},
-                               Known{"staircase2", 32, 21, 13, false});
+                               Known{"staircase2", 32, 21, 13, false},
+                               Known{"living-room-2", 184, 62, 4, false}, Known{"spaceship", 90, 14, 5, false});
   INFO(known.path);
   const Scene scene = readScene(std::filesystem::path(folder) / known.path / "scene.xml");
   checkConsistent(scene);
@@ -85,6 +86,15 @@ TEST_CASE("scenes: scenes from elsewhere") {
   CHECK(scene.materials.size() == known.materials);
   CHECK(std::ranges::count_if(scene.shapes, [](const Shape& s) { return s.emitter.has_value(); }) == known.emitters);
   CHECK(scene.environment.has_value() == known.environment);
+}
+
+TEST_CASE("scenes: both scenes under a sunny sky") {
+  const char* folder = dataFolder();
+  if (!folder) return;
+  const std::string name = GENERATE("kitchen", "dining-room");
+  const Scene scene = readScene(std::filesystem::path(folder) / name / "scene_sunsky.xml");
+  checkConsistent(scene);
+  CHECK(scene.environment.has_value());
 }
 
 TEST_CASE("scenes: the kitchen") {

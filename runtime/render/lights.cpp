@@ -106,15 +106,21 @@ Lights::Lights(const Scene& scene, const Eigen::AlignedBox3f& bounds)
   choose(powers);
 }
 
-// In a scene of kilometres or micrometres, powers may exceed what a float holds; their ratios do not.
+// Power says nothing of what is near: a lamp beside the sky would hardly ever be chosen where it alone gives light.
+constexpr double kEvenShare = 0.2;
+
+// In double precision: in a scene of kilometres or micrometres powers may exceed what a float holds; shares do not.
 void Lights::choose(const std::vector<double>& powers) {
-  double largest = 0;
-  for (const double power : powers) largest = std::max(largest, power);
-  std::vector<float> weights;
+  std::size_t shining = 0;
   for (const double power : powers) {
-    weights.push_back(largest > 0 ? static_cast<float>(std::max(0.0, power) / largest) : 0.0f);
     totalPower_ += std::max(0.0, power);
+    shining += power > 0;
   }
+  std::vector<float> weights;
+  for (const double power : powers)
+    weights.push_back(power > 0 ? static_cast<float>((1 - kEvenShare) * power / totalPower_ +
+                                                     kEvenShare / static_cast<double>(shining))
+                                : 0.0f);
   choice_ = DiscreteDistribution(weights);
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// All emitters of a scene, sampled by power: for the light that reaches a point, and for photons.
+// All emitters of a scene, chosen mostly by power: for the light that reaches a point, and for photons.
 
 #include <optional>
 #include <vector>
