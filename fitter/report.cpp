@@ -1,13 +1,11 @@
 #include "fitter/report.h"
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "runtime/mixture/grid.h"
+#include "fitter/cache_grid.h"
 #include "scenes/tool.h"
 
 namespace lobe {
@@ -23,30 +21,8 @@ double median(std::vector<double> values) {
   return 0.5 * (*middle + *std::max_element(values.begin(), middle));
 }
 
-DirectionGrid gridOf(const LobeCache& cache) {
-  return {static_cast<GridKind>(cache.info().gridKind), static_cast<int>(cache.info().gridCount)};
-}
-
-const char* gridName(const DirectionGrid& grid) {
-  return grid.kind == GridKind::elevation ? "elevation" : "fibonacci";
-}
-
-struct Angles {
-  double elevation, azimuth;  // degrees, elevation from the normal
-};
-
-Angles anglesOf(const Vec3& w) {
-  const double degrees = 180 * std::numbers::inv_pi;
-  return {std::atan2(std::hypot(w.x(), w.y()), w.z()) * degrees, std::atan2(w.y(), w.x()) * degrees};
-}
-
 std::string percent(double share) {
   return fmt::format("{:.2f} %", 100 * share);
-}
-
-/// Floats as the shortest decimal that reads back the same, not as the double they convert to.
-Json number(float value) {
-  return Json::parse(fmt::format("{}", value));
 }
 
 Json recordJson(const LobeCache& cache, const DirectionGrid& grid, std::size_t index) {
@@ -54,18 +30,18 @@ Json recordJson(const LobeCache& cache, const DirectionGrid& grid, std::size_t i
   const Angles angles = anglesOf(grid.direction(static_cast<int>(index)));
   Json json{{"elevation", angles.elevation},
             {"azimuth", angles.azimuth},
-            {"integral", number(r.integral)},
-            {"albedo", number(r.albedo)},
-            {"cosine_mass", number(r.cosineMass)},
-            {"outside", number(r.outside)},
-            {"nev", number(r.nev)},
-            {"nev_coverage", number(r.nevCoverage)},
-            {"worst_ratio", number(r.worstRatio)},
+            {"integral", shortNumber(r.integral)},
+            {"albedo", shortNumber(r.albedo)},
+            {"cosine_mass", shortNumber(r.cosineMass)},
+            {"outside", shortNumber(r.outside)},
+            {"nev", shortNumber(r.nev)},
+            {"nev_coverage", shortNumber(r.nevCoverage)},
+            {"worst_ratio", shortNumber(r.worstRatio)},
             {"components", Json::array()}};
   for (const CacheComponent& c : cache.components(r))
-    json["components"].push_back({{"weight", number(c.weight)},
-                                  {"mean", {number(c.meanX), number(c.meanY)}},
-                                  {"covariance", {number(c.covXX), number(c.covXY), number(c.covYY)}}});
+    json["components"].push_back({{"weight", shortNumber(c.weight)},
+                                  {"mean", {shortNumber(c.meanX), shortNumber(c.meanY)}},
+                                  {"covariance", {shortNumber(c.covXX), shortNumber(c.covXY), shortNumber(c.covYY)}}});
   return json;
 }
 
@@ -90,6 +66,10 @@ CacheSummary summarise(const LobeCache& cache) {
   s.coverageWorst = std::ranges::max(coverage);
   s.bytes = cache.bytes();
   return s;
+}
+
+Json shortNumber(float value) {
+  return Json::parse(fmt::format("{}", value));
 }
 
 std::string abbreviated(const std::vector<std::string>& names) {
@@ -161,7 +141,7 @@ Json toJson(const LobeCache& cache, const std::filesystem::path& path) {
              {{"method", info.settings.method},
               {"components", info.settings.components},
               {"samples", info.settings.samples},
-              {"reduction", number(info.settings.reduction)},
+              {"reduction", shortNumber(info.settings.reduction)},
               {"revision", info.settings.revision}}},
             {"grid", {{"kind", gridName(grid)}, {"count", grid.count}}},
             {"summary", toJson(summarise(cache))},

@@ -49,6 +49,9 @@ void printHeader(const LobeCache& cache, const std::filesystem::path& path, std:
 /// A row for every record.
 void printRecords(const LobeCache& cache, std::FILE* out);
 
+/// A float as the shortest decimal that reads back the same, not as the double it converts to.
+nlohmann::ordered_json shortNumber(float value);
+
 /// "KettleGreen + 21 more"
 std::string abbreviated(const std::vector<std::string>& names);
 

@@ -52,7 +52,8 @@ void checkSound(const FittedRecord& fit) {
   }
   CHECK(sum == Approx(1).margin(1e-5));
   const CacheRecord& r = fit.record;
-  for (const float v : {r.integral, r.albedo, r.cosineMass, r.outside, r.nev, r.nevCoverage}) CHECK(std::isfinite(v));
+  for (const float v : {r.integral, r.albedo, r.cosineMass, r.outside, r.nev, r.nevCoverage, r.worstRatio})
+    CHECK(std::isfinite(v));
   CHECK(r.albedo <= r.integral);
   CHECK(r.cosineMass > 0);
 }

@@ -1,0 +1,30 @@
+#pragma once
+// The directions of a cache's records.
+
+#include <cmath>
+#include <numbers>
+
+#include "runtime/mixture/grid.h"
+#include "schema/lobe_cache.h"
+
+namespace lobe {
+
+inline DirectionGrid gridOf(const LobeCache& cache) {
+  return {static_cast<GridKind>(cache.info().gridKind), static_cast<int>(cache.info().gridCount)};
+}
+
+inline const char* gridName(const DirectionGrid& grid) {
+  return grid.kind == GridKind::elevation ? "elevation" : "fibonacci";
+}
+
+/// In degrees, the elevation from the normal.
+struct Angles {
+  double elevation, azimuth;
+};
+
+inline Angles anglesOf(const Vec3& w) {
+  const double degrees = 180 * std::numbers::inv_pi;
+  return {std::atan2(std::hypot(w.x(), w.y()), w.z()) * degrees, std::atan2(w.y(), w.x()) * degrees};
+}
+
+}  // namespace lobe
