@@ -18,15 +18,15 @@ using namespace lobe;
 constexpr int kPlotRows = 5;
 
 const char* const kFooter =
-    R"(--plot draws a row of panels for each record, over the equal-area disc of sampled directions (x to the right, y up,
-the edge is the horizon; the given direction is at positive x when its azimuth is 0). Narrow lobes are drawn enlarged.
+    R"(--plot draws a row of panels for each record, over the equal-area disc of sampled directions (x is right, y up,
+the edge is the horizon; the given direction is at positive x when its azimuth is 0). Narrow lobes are drawn larger.
   1 target  the lobe times the cosine, normalised (only with --scene)
   2 fit     the mixture times the cosine, normalised, with the one-sigma ellipses of its components in red
     Both from dark violet to light yellow: a logarithmic scale over three decades below the row's peak.
   3 ratio   target over the graded density, a tenth of the lobe's own sampler and nine tenths of the fit, from blue
             (1/10 and below: drawn too often) over white (1) to red (10 and above: drawn too seldom); with --scene
-The ring marks the worst f/p, the largest ratio met when grading, or lies at the border towards it when it is out of view.
-A table says which record each row shows, and where. Grey is outside the disc.
+The ring marks the worst f/p, the largest ratio met when grading; at the border when it is out of view. Grey is outside
+the disc. A table says which record each row shows, and where.
 
 --diff ends with 0 when both caches are the same to the bit, with 1 when they differ, and with 2 on an error.)";
 
