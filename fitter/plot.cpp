@@ -228,6 +228,7 @@ Plot plotRecords(const LobeCache& cache, std::span<const int> records, const Lob
 std::vector<int> spreadRecords(int count, int rows) {
   const int shown = std::min(count, rows);
   std::vector<int> records;
+  records.reserve(static_cast<std::size_t>(shown));
   for (int i = 0; i < shown; ++i) records.push_back(shown > 1 ? i * (count - 1) / (shown - 1) : count / 2);
   return records;
 }
