@@ -1,14 +1,17 @@
 #include "fitter/compile.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <unordered_map>
+#include <utility>
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include "fitter/cache_mixture.h"
 #include "fitter/lobe_fit.h"
+#include "runtime/mixture/lookup.h"
 #include "schema/atomic_file.h"
 
 namespace lobe {
@@ -67,10 +70,50 @@ void makeFolder(const std::filesystem::path& folder) {
   if (error) throw std::runtime_error(fmt::format("{}: cannot make the folder: {}", folder.string(), error.message()));
 }
 
+// ---- Chains: runs of neighbouring directions, each fitted from the one before. They do not depend on the number of
+// threads, so neither do the bytes.
+
+constexpr int kChainLength = 8;
+// A fit from a neighbour that is worse than the neighbour's by more than this is made from scratch as well.
+constexpr float kWorseByFactor = 1.5f, kWorseBy = 0.005f;
+
+/// How far apart neighbours are in the grid's order: of Fibonacci points, the largest Fibonacci number up to the root
+/// of their number, which leads to a near neighbour everywhere but at the pole.
+int neighbourStride(const DirectionGrid& grid) {
+  if (grid.kind == GridKind::elevation) return 1;
+  int a = 1, b = 1;
+  while ((a + b) * (a + b) <= 2 * grid.count) b = std::exchange(a, a + b);
+  return a;
+}
+
+std::vector<std::vector<int>> chainsOf(const DirectionGrid& grid, const FitSettings& settings) {
+  const int stride = neighbourStride(grid), length = settings.method == kMethodWem ? 1 : kChainLength;
+  std::vector<std::vector<int>> chains;
+  for (int first = 0; first < grid.count; first += stride * length) {
+    for (int i = first; i < std::min(first + stride, grid.count); ++i) {
+      std::vector<int>& chain = chains.emplace_back();
+      for (int j = i; j < std::min(first + stride * length, grid.count); j += stride) chain.push_back(j);
+    }
+  }
+  return chains;
+}
+
+FittedRecord fitFromNeighbour(const Lobe& lobe, const DirectionGrid& grid, int entry, int neighbour,
+                              const FittedRecord& fitted, const FitSettings& settings) {
+  const Vec3 wo = grid.direction(entry);
+  Mixture start(fitted.mixture.size());
+  alignMixture(grid, neighbour, fitted.mixture, wo, start);
+  FittedRecord record = fitLobe(lobe, wo, settings, start);
+  if (record.record.nevCoverage <= kWorseByFactor * fitted.record.nevCoverage + kWorseBy) return record;
+  FittedRecord fresh = fitLobe(lobe, wo, settings);
+  return fresh.record.nevCoverage < record.record.nevCoverage ? fresh : record;
+}
+
 }  // namespace
 
 void CompileOptions::validate() const {
   require(!directory.empty(), "--output", "the name of a folder");
+  requireMethod(settings.method);
   require(settings.components >= 1 && settings.components <= kMaxCacheComponents, "--components",
           fmt::format("from 1 to {}", kMaxCacheComponents));
   require(settings.samples >= kMinSamples && settings.samples <= kMaxSamples, "--samples",
@@ -112,9 +155,18 @@ std::vector<CompileJob> planCompile(const std::vector<LobeUse>& uses, const Comp
 FittedGrid fitGrid(const Lobe& lobe, const DirectionGrid& grid, const FitSettings& settings,
                    const std::function<void()>& advance) {
   std::vector<FittedRecord> fitted(static_cast<std::size_t>(grid.count));
-  tbb::parallel_for(0, grid.count, [&](int i) {
-    fitted[static_cast<std::size_t>(i)] = fitLobe(lobe, grid.direction(i), settings);
-    if (advance) advance();
+  const std::vector<std::vector<int>> chains = chainsOf(grid, settings);
+  tbb::parallel_for(std::size_t{0}, chains.size(), [&](std::size_t c) {
+    const std::vector<int>& chain = chains[c];
+    for (std::size_t j = 0; j < chain.size(); ++j) {
+      FittedRecord& record = fitted[static_cast<std::size_t>(chain[j])];
+      if (j == 0)
+        record = fitLobe(lobe, grid.direction(chain[j]), settings);
+      else
+        record = fitFromNeighbour(lobe, grid, chain[j], chain[j - 1], fitted[static_cast<std::size_t>(chain[j - 1])],
+                                  settings);
+      if (advance) advance();
+    }
   });
   FittedGrid result;
   double integral = 0;

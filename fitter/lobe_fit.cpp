@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "fitter/disc_mass.h"
+#include "fitter/lobe_draws.h"
 #include "fitter/low_discrepancy.h"
+#include "fitter/nonlinear_fit.h"
 #include "runtime/mixture/em.h"
 
 namespace lobe {
@@ -15,47 +18,17 @@ namespace {
 
 // The start covariance of every component, in units of the lobe's own.
 constexpr float kStartScale = 0.5f;
-// Floor of the components' variance, in units of the smaller variance of the lobe: no spikes on single points.
-constexpr double kVarianceFloor = 1e-3;
+// Floor of the components' variance, in units of the smaller variance of the lobe: no spikes on single points. The long
+// tails of GGX make that variance a thousand times the peak's at grazing angles.
+constexpr double kVarianceFloor = 1e-4;
 // Single precision resolves the disc to about 1e-7.
 constexpr double kSharpest = 1e-5;
 constexpr float kBroadVariance = 0.25f;
 
-[[noreturn]] void refuse(const Lobe& lobe, const Vec3& wo, const std::string& fault) {
-  throw std::runtime_error(fmt::format("lobe {} cannot be fitted for the direction ({}, {}, {}): {}", lobe.summary(),
-                                       wo.x(), wo.y(), wo.z(), fault));
-}
-
-struct Draw {
-  Vec3 wi;
-  double value;  // ρ, no cosine
-  double pdf;
-};
-
-double evaluate(const Lobe& lobe, const Vec3& wo, const Vec3& wi) {
-  const double value = lobe.eval(wo, wi);
-  if (!(value >= 0 && std::isfinite(value))) refuse(lobe, wo, fmt::format("its value is {}", value));
-  return value;
-}
-
-/// Points first … first+count−1 of the lobe's own sampler, without those of value zero.
-std::vector<Draw> drawFromLobe(const Lobe& lobe, const Vec3& wo, long first, std::uint32_t count) {
-  std::vector<Draw> draws;
-  draws.reserve(count);
-  for (long i = first; i < first + static_cast<long>(count); ++i) {
-    const std::optional<LobeSample> s = lobe.sample(wo, squarePoint(i));
-    if (!s || s->wi.z() <= 0) continue;
-    if (!(s->pdf > 0 && std::isfinite(s->pdf))) refuse(lobe, wo, fmt::format("its sampler has the density {}", s->pdf));
-    const double value = evaluate(lobe, wo, s->wi);
-    if (value > 0) draws.push_back({s->wi, value, s->pdf});
-  }
-  return draws;
-}
-
-std::vector<WeightedPoint> weightedPoints(const std::vector<Draw>& draws) {
+std::vector<WeightedPoint> weightedPoints(const std::vector<LobeDraw>& draws) {
   std::vector<WeightedPoint> points;
   points.reserve(draws.size());
-  for (const Draw& d : draws) points.push_back({toDisc(d.wi), static_cast<float>(d.value / d.pdf)});
+  for (const LobeDraw& d : draws) points.push_back({toDisc(d.wi), static_cast<float>(d.value / d.pdf)});
   return points;
 }
 
@@ -88,12 +61,14 @@ Mixture startMixture(const std::vector<WeightedPoint>& points, const Spread& spr
   return mixture;
 }
 
-Mixture fitMixture(const Lobe& lobe, const Vec3& wo, const std::vector<Draw>& draws, const FitSettings& settings) {
+/// Weighted EM, then merging.
+Mixture expectationMaximised(const Lobe& lobe, const Vec3& wo, const std::vector<LobeDraw>& draws,
+                             const FitSettings& settings) {
   if (draws.empty()) return {{1.0f, 0.0f, 0.0f, Covariance{kBroadVariance, 0.0f, kBroadVariance}}};
   const std::vector<WeightedPoint> points = weightedPoints(draws);
   Spread spread = spreadOf(points);
   if (points.size() < 3) spread = {kBroadVariance, 0, kBroadVariance};
-  if (!(spread.smallerVariance() > kSharpest * kSharpest)) refuse(lobe, wo, "it is too sharp, a mirror would do");
+  if (!(spread.smallerVariance() > kSharpest * kSharpest)) refuseLobe(lobe, wo, "it is too sharp, a mirror would do");
   Mixture mixture = startMixture(points, spread, settings.components);
   WeightedEmOptions options;
   options.minVariance = kVarianceFloor * spread.smallerVariance();
@@ -154,7 +129,7 @@ Moments fromMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> 
     const Vec3 wi = fromDisc(y);
     const double density = p(wi);
     if (!(density > 0)) continue;
-    const double ratio = evaluate(lobe, wo, wi) * wi.z() / density, weight = wi.z() / p.cosineMass();
+    const double ratio = lobeValue(lobe, wo, wi) * wi.z() / density, weight = wi.z() / p.cosineMass();
     worst.visit(ratio, wi);
     sum.first += weight * ratio / samples;
     sum.second += weight * ratio * ratio / samples;
@@ -164,11 +139,17 @@ Moments fromMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> 
 
 }  // namespace
 
+void requireMethod(const std::string& method) {
+  if (method == kMethodWem || method == kMethodCeres || method == kMethodEq8) return;
+  throw std::runtime_error(
+      fmt::format("--method must be {}, {} or {}, not '{}'", kMethodWem, kMethodCeres, kMethodEq8, method));
+}
+
 Quality gradeMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> mixture, std::uint32_t samples) {
   const GradedDensity p(lobe, wo, mixture);
   Worst worst;
   Moments own, covered;  // own: drawn from q as a part of p; covered: ∫ f and ∫ f²/p by importance sampling from q
-  for (const Draw& d : drawFromLobe(lobe, wo, samples, samples)) {
+  for (const LobeDraw& d : drawLobe(lobe, wo, samples, samples)) {
     const double f = d.value * d.wi.z(), ratio = f / p(d.wi, d.pdf);
     worst.visit(ratio, d.wi);
     own.first += ratio / samples;
@@ -183,26 +164,60 @@ Quality gradeMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian>
   return {drawn.relativeVariance(), covered.relativeVariance(), worstRatio, worst.wi};
 }
 
-FittedRecord fitLobe(const Lobe& lobe, const Vec3& wo, const FitSettings& settings) {
-  const std::vector<Draw> draws = drawFromLobe(lobe, wo, 0, settings.samples);
-  FittedRecord fitted{fitMixture(lobe, wo, draws, settings), {}};
-  normalise(fitted.mixture);
+namespace {
+
+struct Graded {
+  Mixture mixture;
+  Quality quality;
+};
+
+Graded graded(const Lobe& lobe, const Vec3& wo, Mixture mixture, std::uint32_t samples) {
+  normalise(mixture);
+  const Quality quality = gradeMixture(lobe, wo, mixture, samples);
+  return {std::move(mixture), quality};
+}
+
+/// What the use of a fit is judged by. Each estimate alone may miss what its points miss.
+double worse(const Quality& q) {
+  return std::max(q.nev, q.coverage);
+}
+
+/// The start, refined when that makes it better.
+Graded refined(const Lobe& lobe, const Vec3& wo, const Mixture& start, const FitSettings& settings) {
+  Graded before = graded(lobe, wo, start, settings.samples);
+  if (settings.method == kMethodWem) return before;
+  NonlinearFitOptions options;
+  if (settings.method == kMethodEq8) options.objective = FitObjective::reflectance;
+  options.points = settings.samples / 2;
+  Graded after = graded(lobe, wo, refineMixture(lobe, wo, before.mixture, options).mixture, settings.samples);
+  return worse(after.quality) < worse(before.quality) ? after : before;
+}
+
+}  // namespace
+
+FittedRecord fitLobe(const Lobe& lobe, const Vec3& wo, const FitSettings& settings, std::span<const Gaussian> start) {
+  requireMethod(settings.method);
+  const std::vector<LobeDraw> draws = drawLobe(lobe, wo, 0, settings.samples);
+  const bool chained = !start.empty() && !draws.empty() && settings.method != kMethodWem;
+  const Graded best =
+      refined(lobe, wo, chained ? Mixture(start.begin(), start.end()) : expectationMaximised(lobe, wo, draws, settings),
+              settings);
+  FittedRecord fitted{best.mixture, {}};
   double integral = 0, albedo = 0;
-  for (const Draw& d : draws) {
+  for (const LobeDraw& d : draws) {
     integral += d.value / d.pdf;
     albedo += d.value * d.wi.z() / d.pdf;
   }
   const DiscMass mass = discMass(fitted.mixture);
-  const Quality quality = gradeMixture(lobe, wo, fitted.mixture, settings.samples);
   CacheRecord& r = fitted.record;
   r.count = static_cast<std::uint32_t>(fitted.mixture.size());
   r.integral = static_cast<float>(integral / settings.samples);
   r.albedo = static_cast<float>(albedo / settings.samples);
   r.cosineMass = static_cast<float>(mass.cosine);
   r.outside = static_cast<float>(std::clamp(1 - mass.inside, 0.0, 1.0));
-  r.nev = static_cast<float>(quality.nev);
-  r.nevCoverage = static_cast<float>(quality.coverage);
-  r.worstRatio = static_cast<float>(quality.worst);
+  r.nev = static_cast<float>(best.quality.nev);
+  r.nevCoverage = static_cast<float>(best.quality.coverage);
+  r.worstRatio = static_cast<float>(best.quality.worst);
   return fitted;
 }
 

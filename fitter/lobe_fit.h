@@ -1,5 +1,6 @@
 #pragma once
-// One record: the mixture of a lobe for one direction wo, by weighted EM, and how good it is.
+// One record: the mixture of a lobe for one direction wo, by weighted EM or by least squares from there, and how good
+// it is.
 //
 // The mixture is fitted to ρ without the cosine (the cosine belongs to the illumination), over the disc of wi.
 
@@ -12,7 +13,16 @@
 namespace lobe {
 
 /// Raised when the code of the fit changes what it returns; caches of another revision are stale.
-inline constexpr std::uint32_t kFitRevision = 1;
+inline constexpr std::uint32_t kFitRevision = 2;
+
+/// FitSettings::method: weighted EM; least squares for the use in a product, by Ceres; least squares by the objective
+/// of Herholz et al. 2016, Eq. 8.
+inline constexpr const char* kMethodWem = "wem";
+inline constexpr const char* kMethodCeres = "ceres";
+inline constexpr const char* kMethodEq8 = "eq8";
+
+/// Throws std::runtime_error that says what there is instead.
+void requireMethod(const std::string& method);
 
 /// The share of BSDF sampling in the density that a fit is graded with.
 inline constexpr double kDefensiveShare = 0.1;
@@ -36,7 +46,11 @@ struct FittedRecord {
 };
 
 /// Fits the lobe for wo (unit, z > 0). Deterministic. Where nothing is reflected the record has integral and albedo 0
-/// and a broad component. Throws std::runtime_error when the lobe returns numbers that are not finite, or is too sharp.
-FittedRecord fitLobe(const Lobe& lobe, const Vec3& wo, const FitSettings& settings);
+/// and a broad component. Least squares start from weighted EM, or from `start` where one is given (the mixture of a
+/// neighbouring direction, brought to wo), whose components then keep their order and number; what they find is kept
+/// only when it grades better than the start. Throws std::runtime_error when the lobe returns numbers that are not
+/// finite, or is too sharp, or when there is no such method.
+FittedRecord fitLobe(const Lobe& lobe, const Vec3& wo, const FitSettings& settings,
+                     std::span<const Gaussian> start = {});
 
 }  // namespace lobe

@@ -27,6 +27,9 @@ struct Options {
 void declare(CLI::App& app, Options& o) {
   app.add_option("scene", o.scene, "Mitsuba scene file")->required()->type_name("SCENE.xml")->default_str("");
   app.add_option("-o,--output", o.compile.directory, "Folder of the cache files, made when missing")->type_name("DIR");
+  app.add_option(
+      "--method", o.compile.settings.method,
+      "How records are fitted: wem (weighted EM), ceres (least squares for the product) or eq8 (the paper's)");
   app.add_option("--components", o.compile.settings.components, "Gaussians of a record before merging");
   app.add_option("--elevations", o.compile.elevations, "Records of an isotropic lobe");
   app.add_option("--directions", o.compile.directions, "Records of an anisotropic lobe");
