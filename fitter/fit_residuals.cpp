@@ -81,20 +81,19 @@ void densityDerivatives(const WhitenedComponent& c, const ComponentAtPoints& at,
   column(0) = share - c.weight * slope * mixtureDensity;
   column(1) = share * (at.u0 * c.meanSlope(0, 0) + at.u1 * c.meanSlope(1, 0));
   column(2) = share * (at.u0 * c.meanSlope(0, 1) + at.u1 * c.meanSlope(1, 1));
-  column(3) = share * (at.u0 * (at.u0 * l11 + at.u1 * l21) - sl(0, 0)) * l11;
-  column(4) = share * (at.u1 * (at.u0 * l11 + at.u1 * l21) - sl(1, 0));
-  column(5) = share * (at.u1 * at.u1 * l22 - sl(1, 1)) * l22;
+  column(3) = share * (at.u0 * (at.u0 * l11 + at.u1 * l21) - sl(0, 0)) * c.lowerSlope(0, 0);
+  column(4) = share * (at.u1 * (at.u0 * l11 + at.u1 * l21) - sl(1, 0)) * c.lowerSlope(1, 0);
+  column(5) = share * (at.u1 * at.u1 * l22 - sl(1, 1)) * c.lowerSlope(1, 1);
 }
 
 using Slopes = Eigen::Matrix<double, 1, kComponentParameters>;
 
 // How a component's parameters change a mass of the mixture.
 Slopes massDerivatives(const WhitenedComponent& c, const MassSlope& mass, double mixtureMass) {
-  const Matrix2d byLower = 2 * mass.byCov * c.lower;
+  const Matrix2d byLower = (2 * mass.byCov * c.lower).cwiseProduct(c.lowerSlope);
   const Vector2d byMean = c.meanSlope.transpose() * mass.byMean;
   Slopes slopes;
-  slopes << mass.value - mixtureMass, byMean.x(), byMean.y(), byLower(0, 0) * c.lower(0, 0), byLower(1, 0),
-      byLower(1, 1) * c.lower(1, 1);
+  slopes << mass.value - mixtureMass, byMean.x(), byMean.y(), byLower(0, 0), byLower(1, 0), byLower(1, 1);
   return c.weight * slopes;
 }
 

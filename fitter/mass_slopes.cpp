@@ -15,8 +15,8 @@ using Eigen::Vector2d;
 
 // A Gaussian reaches this many standard deviations, for the purposes of a fit.
 constexpr double kReach = 5;
-constexpr int kLeastAzimuths = 64, kMostAzimuths = 1024;
-constexpr double kAzimuthsPerElongation = 32;
+constexpr int kLeastAzimuths = 128, kMostAzimuths = 1024;
+constexpr double kAzimuthsPerElongation = 64;
 
 // ∫ exp(−r²/2) rⁿ dr between the ray's ends for n = 1, 2, 3.
 struct RadialMoments {

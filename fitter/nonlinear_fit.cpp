@@ -116,7 +116,7 @@ NonlinearFit refineMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gau
   fit.iterations = summary.iterations;
   fit.startCost = 2 * summary.initial_cost;
   fit.cost = 2 * summary.final_cost;
-  if (!(fit.cost < fit.startCost)) return fit;
+  if (!(fit.cost < fit.startCost) || !parameters.allFinite()) return fit;
   fit.mixture =
       toMixture(fromParameters({parameters.data(), static_cast<std::size_t>(parameters.size())}, points.whitening),
                 points.whitening);

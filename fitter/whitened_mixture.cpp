@@ -29,15 +29,15 @@ Matrix2d lowerFactor(const Matrix2d& covariance) {
 }
 
 // Means stay in the disc: from this radius on, the parameters' distance r from the centre is bent to
-// kBend + (1 − kBend) t/(1 + t), t = (r − kBend)/(1 − kBend), which stays below 1.
-constexpr double kBend = 0.9, kLargestRadius = 0.999;
+// kBend + kRoom t/(1 + t), t = (r − kBend)/kRoom, which stays below 1 in single precision too.
+constexpr double kBend = 0.9, kRoom = 0.09999, kLargestRadius = 0.999;
 
 /// The mean over the disc for parameters that stand for the point y, and its slope.
 Vector2d bent(const Vector2d& y, Matrix2d& slope) {
   const double r = y.norm();
   slope.setIdentity();
   if (r <= kBend) return y;
-  const double t = (r - kBend) / (1 - kBend), scale = (kBend + (1 - kBend) * t / (1 + t)) / r;
+  const double t = (r - kBend) / kRoom, scale = (kBend + kRoom * t / (1 + t)) / r;
   const Matrix2d radial = y * y.transpose() / (r * r);
   slope = scale * (slope - radial) + radial / ((1 + t) * (1 + t));
   return scale * y;
@@ -46,8 +46,16 @@ Vector2d bent(const Vector2d& y, Matrix2d& slope) {
 Vector2d unbent(const Vector2d& mean) {
   const double r = std::min(mean.norm(), kLargestRadius);
   if (r <= kBend) return mean;
-  const double s = (r - kBend) / (1 - kBend);
-  return mean.normalized() * (kBend + (1 - kBend) * s / (1 - s));
+  const double s = (r - kBend) / kRoom;
+  return mean.normalized() * (kBend + kRoom * s / (1 - s));
+}
+
+void setLower(double log11, double l21, double log22, WhitenedComponent& c) {
+  const double largestLog = std::log(kLargestDeviation);
+  c.lower << std::exp(std::min(log11, largestLog)), 0, std::clamp(l21, -kLargestDeviation, kLargestDeviation),
+      std::exp(std::min(log22, largestLog));
+  c.lowerSlope << (log11 < largestLog ? c.lower(0, 0) : 0), 0, (std::abs(l21) < kLargestDeviation ? 1 : 0),
+      (log22 < largestLog ? c.lower(1, 1) : 0);
 }
 
 Matrix2d covarianceOf(const Gaussian& g) {
@@ -75,7 +83,7 @@ std::vector<WhitenedComponent> fromParameters(std::span<const double> parameters
     c.weight = std::exp(p[0] - largest);
     c.mean = whitening.inverse(bent(whitening.centre + whitening.factor * Vector2d(p[1], p[2]), c.meanSlope));
     c.meanSlope = inverse * c.meanSlope * whitening.factor;
-    c.lower << std::exp(p[3]), 0, p[4], std::exp(p[5]);
+    setLower(p[3], p[4], p[5], c);
     c.covariance = c.lower * c.lower.transpose() + kLeastVariance * Matrix2d::Identity();
     sum += c.weight;
   }

@@ -20,17 +20,21 @@ struct Whitening {
 };
 
 /// Of a component: logarithm of its weight before normalisation, mean (2), log l11, l21, log l22, with
-/// Σ = L Lᵀ + kLeastVariance·I in whitened coordinates.
+/// Σ = L Lᵀ + kLeastVariance·I in whitened coordinates. Beyond kLargestDeviation the entries of L no longer follow.
 inline constexpr int kComponentParameters = 6;
 
 /// Of the lobe's own variance: no component is a spike that hides between the points of a fit.
 inline constexpr double kLeastVariance = 1e-5;
+
+/// Of the lobe's own deviation: a component that has lost its weight does not grow without end.
+inline constexpr double kLargestDeviation = 5;
 
 struct WhitenedComponent {
   double weight;
   Eigen::Vector2d mean;
   Eigen::Matrix2d meanSlope;   ///< of the mean by its parameters
   Eigen::Matrix2d lower;       ///< L
+  Eigen::Matrix2d lowerSlope;  ///< of each entry of L by its parameter
   Eigen::Matrix2d covariance;  ///< Σ
 };
 

@@ -15,16 +15,6 @@ using namespace lobe;
 
 namespace {
 
-LobePtr conductorLobe(double alphaU, double alphaV, const std::string& distribution = "ggx") {
-  return roughConductor(alphaU, alphaV, distribution)->lobes().front();
-}
-
-Vec3 direction(double elevationDegrees, double azimuthDegrees = 0) {
-  const double theta = elevationDegrees * std::numbers::pi / 180, phi = azimuthDegrees * std::numbers::pi / 180;
-  return Vec3(static_cast<float>(std::sin(theta) * std::cos(phi)), static_cast<float>(std::sin(theta) * std::sin(phi)),
-              static_cast<float>(std::cos(theta)));
-}
-
 /// Midpoints of a fine grid of squares over the disc: shares nothing with the fitter but the disc map. f: of y and wi.
 template <class F>
 double discIntegral(int resolution, const F& f) {
@@ -37,25 +27,6 @@ double discIntegral(int resolution, const F& f) {
     }
   }
   return sum * step * step;
-}
-
-void checkSound(const FittedRecord& fit) {
-  double sum = 0;
-  REQUIRE(!fit.mixture.empty());
-  for (const Gaussian& g : fit.mixture) {
-    CHECK(g.weight >= 0);
-    CHECK((std::isfinite(g.meanX) && std::isfinite(g.meanY)));
-    CHECK(g.mean().norm() <= 1.0f);
-    CHECK(g.cov.xx > 0);
-    CHECK(g.cov.determinant() > 0);
-    sum += g.weight;
-  }
-  CHECK(sum == Approx(1).margin(1e-5));
-  const CacheRecord& r = fit.record;
-  for (const float v : {r.integral, r.albedo, r.cosineMass, r.outside, r.nev, r.nevCoverage, r.worstRatio})
-    CHECK(std::isfinite(v));
-  CHECK(r.albedo <= r.integral);
-  CHECK(r.cosineMass > 0);
 }
 
 /// A constant over the hemisphere, or over a small disc of the disc about (0.3, 0).
