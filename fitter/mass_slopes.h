@@ -18,8 +18,8 @@ struct MassSlopes {
 
 /// Of N(mean, factor·factorᵀ), mean in the disc, factor invertible. In closed form where the Gaussian keeps clear of
 /// the edge; else by quadrature over the azimuth about the mean with the radius in closed form, as discMass but
-/// coarser: to about 1e-4, the slopes of long thin Gaussians at the very edge to some percent. Enough for the steps of a
-/// fit.
+/// coarser: to about 1e-4, the slopes of long thin Gaussians at the very edge to some percent. Enough for the steps of
+/// a fit.
 MassSlopes massSlopes(const Eigen::Vector2d& mean, const Eigen::Matrix2d& factor);
 
 }  // namespace lobe
