@@ -23,6 +23,8 @@ constexpr float kStartScale = 0.5f;
 constexpr double kVarianceFloor = 1e-4;
 // Single precision resolves the disc to about 1e-7.
 constexpr double kSharpest = 1e-5;
+// Weighted EM that only starts least squares need not converge.
+constexpr int kStartSweeps = 15;
 constexpr float kBroadVariance = 0.25f;
 
 std::vector<WeightedPoint> weightedPoints(const std::vector<LobeDraw>& draws) {
@@ -72,6 +74,7 @@ Mixture expectationMaximised(const Lobe& lobe, const Vec3& wo, const std::vector
   Mixture mixture = startMixture(points, spread, settings.components);
   WeightedEmOptions options;
   options.minVariance = kVarianceFloor * spread.smallerVariance();
+  if (settings.method != kMethodWem) options.maxSweeps = kStartSweeps;
   weightedEm(points, mixture, options);
   std::erase_if(mixture, [](const Gaussian& g) { return !(g.weight > 0); });
   if (settings.reduction > 0) reduce(mixture, settings.reduction);
