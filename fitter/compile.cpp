@@ -172,6 +172,8 @@ FittedGrid fitGrid(const Lobe& lobe, const DirectionGrid& grid, const FitSetting
   double integral = 0;
   for (FittedRecord& f : fitted) {
     f.record.first = static_cast<std::uint32_t>(result.components.size());
+    f.record.entry = static_cast<std::uint32_t>(result.records.size());
+    result.lookup.push_back({f.record.entry});
     result.records.push_back(f.record);
     for (const Gaussian& g : f.mixture) result.components.push_back(asComponent(g));
     integral += f.record.integral;
@@ -184,7 +186,7 @@ FittedGrid fitGrid(const Lobe& lobe, const DirectionGrid& grid, const FitSetting
 void runCompile(const CompileJob& job, const std::function<void()>& advance) {
   const FittedGrid fit = fitGrid(*job.use.lobe, job.grid, job.info.settings, advance);
   makeFolder(job.path.parent_path());
-  writeAtomically(job.path, encodeLobeCache(job.info, fit.records, fit.components));
+  writeAtomically(job.path, encodeLobeCache(job.info, fit.records, fit.components, fit.lookup));
 }
 
 }  // namespace lobe

@@ -55,6 +55,7 @@ void runCompile(const CompileJob& job, const std::function<void()>& advance);
 struct FittedGrid {
   std::vector<CacheRecord> records;
   std::vector<CacheComponent> components;
+  std::vector<CacheLookup> lookup;  ///< of every entry of the grid
 };
 FittedGrid fitGrid(const Lobe& lobe, const DirectionGrid& grid, const FitSettings& settings,
                    const std::function<void()>& advance = {});

@@ -45,6 +45,10 @@ class Lobe {
   /// surface.
   virtual double eval(const Vec3& wo, const Vec3& wi) const = 0;
 
+  /// Whether ρ stays the same when both directions are mirrored in the frame's x axis, and in its y axis: then the fits
+  /// of a quarter of the directions are enough.
+  virtual bool mirrorSymmetric() const { return false; }
+
   /// Draws wi for wo.z > 0 from u uniform in [0,1)². nullopt: the sample has value zero (below the surface, say), and
   /// counts as a sample.
   virtual std::optional<LobeSample> sample(const Vec3& wo, const Vec2& u) const = 0;

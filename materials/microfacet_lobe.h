@@ -15,6 +15,7 @@ class MicrofacetLobe : public Lobe {
   explicit MicrofacetLobe(const Microfacet& microfacet) : microfacet_(microfacet) {}
 
   LobeKind kind() const final;
+  bool mirrorSymmetric() const final { return true; }
   std::string model() const final;
   std::string key() const final;
   std::string summary() const final;

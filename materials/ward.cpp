@@ -35,6 +35,7 @@ class WardLobe final : public Lobe {
   WardLobe(Variant variant, double alphaU, double alphaV)
       : variant_(variant), normals_(Microfacet::Kind::beckmann, alphaU, alphaV) {}
 
+  bool mirrorSymmetric() const override { return true; }
   LobeKind kind() const override {
     return normals_.alphaU() == normals_.alphaV() ? LobeKind::isotropic : LobeKind::anisotropic;
   }

@@ -16,7 +16,7 @@
 
 namespace lobe {
 
-inline constexpr std::uint16_t kFormatMajor = 2;
+inline constexpr std::uint16_t kFormatMajor = 3;
 inline constexpr std::uint16_t kFormatMinor = 0;
 
 /// A read-only memory map of a whole file. Move-only.

@@ -20,6 +20,7 @@ static_assert(std::is_trivially_copyable_v<CacheComponent> && std::is_standard_l
 static_assert(std::is_trivially_copyable_v<CacheRecord> && std::is_standard_layout_v<CacheRecord>);
 
 constexpr std::uint8_t kLastGridKind = 1;
+constexpr std::uint32_t kMirrorX = 1u << 30, kMirrorY = 1u << 31;
 constexpr double kWeightTolerance = 1e-4;
 // Single precision loses the determinant of anything flatter.
 constexpr double kMinRelativeDeterminant = 1e-7;
@@ -53,9 +54,10 @@ void checkRecord(const CacheRecord& r, std::size_t index, std::span<const CacheC
           "a number is not finite");
   require(r.integral >= 0 && r.albedo >= 0 && r.nev >= 0 && r.nevCoverage >= 0 && r.worstRatio >= 0,
           "a negative quantity");
-  require(r.cosineMass > 0 && r.cosineMass <= 1.0001f, "cosine mass out of range");
+  require((r.cosineMass > 0 || r.count == 0) && r.cosineMass <= 1.0001f, "cosine mass out of range");
   require(r.outside >= 0 && r.outside <= 1, "share outside the disc out of range");
-  require(r.count >= 1 && r.count <= kMaxCacheComponents, "number of components out of range");
+  require(r.count <= kMaxCacheComponents, "number of components out of range");
+  if (r.count == 0) return;
   require(r.first <= components.size() && r.count <= components.size() - r.first, "components out of range");
   double sum = 0;
   for (const CacheComponent& c : components.subspan(r.first, r.count)) sum += c.weight;
@@ -79,7 +81,8 @@ LobeCacheInfo readInfo(const fb::LobeCache& cache) {
   info.key = cache.key()->str();
   info.summary = cache.summary()->str();
   info.modelRevision = cache.model_revision();
-  info.settings = {s.method() ? s.method()->str() : "", s.components(), s.samples(), s.reduction(), s.revision()};
+  info.settings = {
+      s.method() ? s.method()->str() : "", s.components(), s.samples(), s.reduction(), s.revision(), s.quality()};
   info.gridKind = cache.grid_kind();
   info.gridCount = cache.grid_count();
   return info;
@@ -103,10 +106,21 @@ LobeCache::LobeCache(MappedFile file, const std::filesystem::path& path) : file_
   records_ = inPlace<CacheRecord>(*cache.records());
   components_ = inPlace<CacheComponent>(*cache.components());
   if (info_.gridKind > kLastGridKind) refuse(name, fmt::format("grid of unknown kind {}", info_.gridKind));
-  if (info_.gridCount < 1 || info_.gridCount != records_.size())
-    refuse(name, fmt::format("{} records for a grid of {} directions", records_.size(), info_.gridCount));
+  lookup_ = {cache.lookup()->data(), cache.lookup()->size()};
+  if (info_.gridCount < 1 || info_.gridCount != lookup_.size())
+    refuse(name, fmt::format("{} look-ups for a grid of {} directions", lookup_.size(), info_.gridCount));
   for (std::size_t i = 0; i < components_.size(); ++i) checkComponent(components_[i], i, name);
-  for (std::size_t i = 0; i < records_.size(); ++i) checkRecord(records_[i], i, components_, name);
+  for (std::size_t i = 0; i < records_.size(); ++i) {
+    checkRecord(records_[i], i, components_, name);
+    if (records_[i].entry >= info_.gridCount) refuse(name, fmt::format("record {}: direction out of range", i));
+  }
+  for (std::uint32_t i = 0; i < lookup_.size(); ++i)
+    if (lookup(i).record >= records_.size()) refuse(name, fmt::format("look-up {}: record out of range", i));
+}
+
+CacheLookup LobeCache::lookup(std::uint32_t entry) const {
+  const std::uint32_t bits = lookup_[entry];
+  return {bits & ~(kMirrorX | kMirrorY), (bits & kMirrorX) != 0, (bits & kMirrorY) != 0};
 }
 
 LobeCache LobeCache::open(const std::filesystem::path& path) {
@@ -118,11 +132,12 @@ std::string lobeFileName(const std::string& model, const std::string& key) {
 }
 
 std::vector<std::byte> encodeLobeCache(const LobeCacheInfo& info, std::span<const CacheRecord> records,
-                                       std::span<const CacheComponent> components) {
+                                       std::span<const CacheComponent> components,
+                                       std::span<const CacheLookup> lookup) {
   flatbuffers::FlatBufferBuilder builder(1024 + records.size_bytes() + components.size_bytes());
   const FitSettings& s = info.settings;
-  const auto settings =
-      fb::CreateFitSettings(builder, builder.CreateString(s.method), s.components, s.samples, s.reduction, s.revision);
+  const auto settings = fb::CreateFitSettings(builder, builder.CreateString(s.method), s.components, s.samples,
+                                              s.reduction, s.revision, s.quality);
   // One after the other: the order in which arguments of a call are evaluated is the compiler's choice.
   const auto toolVersion = builder.CreateString(info.toolVersion);
   const auto model = builder.CreateString(info.model);
@@ -132,8 +147,12 @@ std::vector<std::byte> encodeLobeCache(const LobeCacheInfo& info, std::span<cons
       builder.CreateVectorOfStructs(reinterpret_cast<const fb::Record*>(records.data()), records.size());
   const auto componentVector =
       builder.CreateVectorOfStructs(reinterpret_cast<const fb::Component*>(components.data()), components.size());
+  std::vector<std::uint32_t> bits;
+  for (const CacheLookup& l : lookup)
+    bits.push_back(l.record | (l.mirrorX ? kMirrorX : 0) | (l.mirrorY ? kMirrorY : 0));
+  const auto lookupVector = builder.CreateVector(bits);
   builder.Finish(fb::CreateLobeCache(builder, toolVersion, model, key, info.modelRevision, summary, settings,
-                                     info.gridKind, info.gridCount, recordVector, componentVector));
+                                     info.gridKind, info.gridCount, lookupVector, recordVector, componentVector));
   return wrapPayload(kKind, std::as_bytes(std::span(builder.GetBufferPointer(), builder.GetSize())));
 }
 

@@ -17,8 +17,15 @@ struct CacheComponent {
   float weight, meanX, meanY, covXX, covXY, covYY;
 };
 struct CacheRecord {
-  std::uint32_t first, count;
+  std::uint32_t entry, first, count;
   float integral, albedo, cosineMass, outside, nev, nevCoverage, worstRatio;
+};
+
+/// The record that serves an entry of the grid, to be mirrored in the disc's axes.
+struct CacheLookup {
+  std::uint32_t record;
+  bool mirrorX = false, mirrorY = false;
+  bool operator==(const CacheLookup&) const = default;
 };
 
 struct FitSettings {
@@ -27,6 +34,7 @@ struct FitSettings {
   std::uint32_t samples = 4096;
   float reduction = 0.1f;
   std::uint32_t revision = 1;
+  float quality = 0;
   bool operator==(const FitSettings&) const = default;
 };
 
@@ -42,7 +50,7 @@ struct LobeCacheInfo {
 /// An open cache: the mapped file, checked, with its records in place. Immutable; move-only.
 class LobeCache {
  public:
-  /// Maps, verifies the structure, then the meaning: a record per grid entry, indices in range, weights that sum to
+  /// Maps, verifies the structure, then the meaning: a look-up per grid entry, indices in range, weights that sum to
   /// one, positive definite covariances, finite numbers. Throws std::runtime_error that names the file and the fault.
   static LobeCache open(const std::filesystem::path& path);
 
@@ -52,6 +60,8 @@ class LobeCache {
   std::span<const CacheComponent> components(const CacheRecord& r) const {
     return components_.subspan(r.first, r.count);
   }
+  /// entry < info().gridCount.
+  CacheLookup lookup(std::uint32_t entry) const;
   std::uint64_t hash() const { return header_.hash; }  ///< of the whole content
   /// The file's format version.
   const ContainerHeader& header() const { return header_; }
@@ -63,6 +73,7 @@ class LobeCache {
   LobeCacheInfo info_;
   std::span<const CacheRecord> records_;
   std::span<const CacheComponent> components_;
+  std::span<const std::uint32_t> lookup_;
   ContainerHeader header_{};
 };
 
@@ -75,6 +86,6 @@ std::string lobeFileName(const std::string& model, const std::string& key);
 
 /// The bytes of a cache file; the same input gives the same bytes.
 std::vector<std::byte> encodeLobeCache(const LobeCacheInfo& info, std::span<const CacheRecord> records,
-                                       std::span<const CacheComponent> components);
+                                       std::span<const CacheComponent> components, std::span<const CacheLookup> lookup);
 
 }  // namespace lobe

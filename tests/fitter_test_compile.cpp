@@ -104,10 +104,11 @@ TEST_CASE("fitter: the summary of a cache is that of its records") {
   info.gridCount = 3;
   const CacheComponent c{1, 0, 0, 0.1f, 0, 0.1f};
   const CacheComponent half{0.5f, 0, 0, 0.1f, 0, 0.1f};
-  const std::vector<CacheRecord> records{{0, 1, 1, 1, 0.5f, 0.1f, 0.3f, 0.4f, 2.0f},
-                                         {1, 2, 1, 1, 0.5f, 0.3f, 0.1f, 0.6f, 5.0f},
-                                         {0, 1, 1, 1, 0.5f, 0.2f, 0.2f, 0.5f, 3.0f}};
-  writeAtomically(folder / "x.lobe", encodeLobeCache(info, records, std::vector{c, half, half}));
+  const std::vector<CacheRecord> records{{0, 0, 1, 1, 1, 0.5f, 0.1f, 0.3f, 0.4f, 2.0f},
+                                         {1, 1, 2, 1, 1, 0.5f, 0.3f, 0.1f, 0.6f, 5.0f},
+                                         {2, 0, 1, 1, 1, 0.5f, 0.2f, 0.2f, 0.5f, 3.0f}};
+  writeAtomically(folder / "x.lobe",
+                  encodeLobeCache(info, records, std::vector{c, half, half}, std::vector<CacheLookup>{{0}, {1}, {2}}));
   const CacheSummary s = summarise(LobeCache::open(folder / "x.lobe"));
   CHECK(s.records == 3);
   CHECK(s.meanComponents == Approx(4.0 / 3));

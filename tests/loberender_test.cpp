@@ -133,7 +133,9 @@ TEST_CASE("loberender: a cache of another version of the lobe is stale") {
     const LobeCache cache = LobeCache::open(path);
     LobeCacheInfo info = cache.info();
     ++info.modelRevision;
-    bytes = encodeLobeCache(info, cache.records(), cache.components());
+    std::vector<CacheLookup> lookup;
+    for (std::uint32_t i = 0; i < info.gridCount; ++i) lookup.push_back(cache.lookup(i));
+    bytes = encodeLobeCache(info, cache.records(), cache.components(), lookup);
   }
   writeAtomically(path, std::span<const std::byte>(bytes));
   const std::string line = fault(folder, kRender, 1);

@@ -40,7 +40,8 @@ struct Content {
   LobeCacheInfo info;
   std::vector<CacheRecord> records;
   std::vector<CacheComponent> components;
-  std::vector<std::byte> encode() const { return encodeLobeCache(info, records, components); }
+  std::vector<CacheLookup> lookup;
+  std::vector<std::byte> encode() const { return encodeLobeCache(info, records, components, lookup); }
 };
 
 Content smallCache() {
@@ -52,10 +53,12 @@ Content smallCache() {
   c.info.modelRevision = 3;
   c.info.gridKind = 0;
   c.info.gridCount = 2;
-  c.records = {{0, 1, 1.5f, 0.75f, 0.5f, 0.01f, 0.2f, 0.3f, 1.5f}, {1, 2, 1.25f, 0.5f, 0.25f, 0.02f, 0.4f, 0.6f, 3.0f}};
+  c.records = {{0, 0, 1, 1.5f, 0.75f, 0.5f, 0.01f, 0.2f, 0.3f, 1.5f},
+               {1, 1, 2, 1.25f, 0.5f, 0.25f, 0.02f, 0.4f, 0.6f, 3.0f}};
   c.components = {{1.0f, 0.1f, 0.2f, 0.03f, 0.01f, 0.04f},
                   {0.25f, -0.1f, 0.3f, 0.02f, 0.0f, 0.05f},
                   {0.75f, 0.4f, -0.2f, 0.01f, -0.005f, 0.06f}};
+  c.lookup = {{0}, {1, true, false}};
   return c;
 }
 
@@ -116,6 +119,7 @@ TEST_CASE("schema: a cache reads back as written, in place") {
   REQUIRE(cache.records().size() == 2);
   CHECK(std::ranges::equal(std::as_bytes(cache.records()), std::as_bytes(std::span(c.records))));
   CHECK(std::ranges::equal(std::as_bytes(cache.components()), std::as_bytes(std::span(c.components))));
+  for (std::uint32_t i = 0; i < 2; ++i) CHECK(cache.lookup(i) == c.lookup[i]);
   CHECK(cache.components(cache.records()[1]).size() == 2);
   CHECK(cache.components(cache.records()[1]).data() == cache.components().data() + 1);
 }
@@ -125,9 +129,9 @@ TEST_CASE("schema: fields in place are those of the FlatBuffers schema") {
   const auto fc = std::bit_cast<fb::Component>(c);
   CHECK((fc.weight() == 1 && fc.mean_x() == 2 && fc.mean_y() == 3));
   CHECK((fc.cov_xx() == 4 && fc.cov_xy() == 5 && fc.cov_yy() == 6));
-  const CacheRecord r{1, 2, 3, 4, 5, 6, 7, 8, 9};
+  const CacheRecord r{10, 1, 2, 3, 4, 5, 6, 7, 8, 9};
   const auto fr = std::bit_cast<fb::Record>(r);
-  CHECK((fr.first() == 1 && fr.count() == 2 && fr.integral() == 3 && fr.albedo() == 4));
+  CHECK((fr.entry() == 10 && fr.first() == 1 && fr.count() == 2 && fr.integral() == 3 && fr.albedo() == 4));
   CHECK((fr.cosine_mass() == 5 && fr.outside() == 6 && fr.nev() == 7 && fr.nev_coverage() == 8));
   CHECK(fr.worst_ratio() == 9);
 }
@@ -223,7 +227,9 @@ TEST_CASE("schema: faults of meaning are refused") {
       {"not positive definite", [](Content& c) { c.components[2] = {0.75f, 0, 0, 0, 0, 0}; }},
       {"components out of range", [](Content& c) { c.records[1].first = 2; }},
       {"components out of range", [](Content& c) { c.records[1].first = 0xffffffffu; }},
-      {"number of components", [](Content& c) { c.records[0].count = 0; }},
+      {"direction out of range", [](Content& c) { c.records[1].entry = 2; }},
+      {"record out of range", [](Content& c) { c.lookup[0].record = 2; }},
+      {"2 look-ups", [](Content& c) { c.info.gridCount = 3; }},
       {"number of components", [](Content& c) { c.records[0].count = kMaxCacheComponents + 1; }},
       {"not finite", [&](Content& c) { c.records[0].nev = nan; }},
       {"not finite", [&](Content& c) { c.records[0].worstRatio = nan; }},

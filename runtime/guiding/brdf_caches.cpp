@@ -32,6 +32,13 @@ LobeCache openFor(const std::filesystem::path& folder, const LobeRequest& reques
 
 }  // namespace
 
+BrdfCaches::Entry::Entry(LobeCache opened)
+    : cache(std::move(opened)),
+      grid{static_cast<GridKind>(cache.info().gridKind), static_cast<int>(cache.info().gridCount)} {
+  for (const CacheRecord& record : cache.records())
+    references.push_back(toDisc(grid.direction(static_cast<int>(record.entry))));
+}
+
 BrdfCaches::BrdfCaches(const std::filesystem::path& folder, std::span<const LobeRequest> requests,
                        const std::string& remedy) {
   std::map<std::string, int> known;
@@ -41,9 +48,7 @@ BrdfCaches::BrdfCaches(const std::filesystem::path& folder, std::span<const Lobe
     cacheOfRequest_.push_back(entry->second);
     if (!added) continue;
     try {
-      LobeCache cache = openFor(folder, request);
-      const DirectionGrid grid{static_cast<GridKind>(cache.info().gridKind), static_cast<int>(cache.info().gridCount)};
-      caches_.push_back({std::move(cache), grid});
+      caches_.emplace_back(openFor(folder, request));
     } catch (const std::runtime_error& e) {
       faults[e.what()].push_back(request.material);
       known.erase(entry);  // so that the next material of the same lobe is named, too
@@ -65,15 +70,18 @@ void BrdfCaches::add(int lobe, const Vec3& wo, const Vec2& turn, float tint, Ref
   };
   // An isotropic lobe can be looked up in the frame wanted; an anisotropic one knows its tangent and is turned after.
   const Vec3 query = isotropic ? turned(wo) : wo;
-  const int index = entry.grid.nearest(query);
-  const CacheRecord& record = entry.cache.records()[index];
+  const CacheLookup found = entry.cache.lookup(static_cast<std::uint32_t>(entry.grid.nearest(query)));
+  const CacheRecord& record = entry.cache.records()[found.record];
   const std::span<const Gaussian> fitted = asGaussians(entry.cache.components(record));
   const std::span<Gaussian> room = std::span(reflectance.components).subspan(reflectance.count);
-  if (fitted.size() > room.size()) return;
+  const bool covered = !fitted.empty() && fitted.size() <= room.size();
+  (covered ? reflectance.albedo : reflectance.uncoveredAlbedo) += tint * record.albedo;
+  if (!covered) return;
 
   // ρ = integral · G / 2, because dω = 2 dA, with G normalised over the disc: records are over the plane.
   const float scale = 0.5f * tint * record.integral / std::max(1.0f - record.outside, 0.1f);
-  for (Gaussian& g : alignMixture(entry.grid, index, fitted, query, room)) {
+  const Alignment alignment{entry.grid.kind, entry.references[found.record], found.mirrorX, found.mirrorY};
+  for (Gaussian& g : alignMixture(alignment, fitted, query, room)) {
     if (!isotropic) g = rotated(g, turn);
     g.weight *= scale;
   }

@@ -28,7 +28,7 @@ class BrdfCaches {
 
   /// Adds tint · ρ_lobe at wo to a reflectance. lobe: index of the request. wo: unit, z > 0, in the shading frame.
   /// turn: (cos, sin) of the angle by which the reflectance's frame sees shading-frame vectors turned about the normal.
-  /// A lobe whose components do not fit any more is left out: it is then sampled by the BSDF only.
+  /// A lobe without components, or whose components do not fit any more, is left to the BSDF's sampler.
   void add(int lobe, const Vec3& wo, const Vec2& turn, float tint, Reflectance& reflectance) const;
 
   std::size_t files() const { return caches_.size(); }
@@ -38,8 +38,10 @@ class BrdfCaches {
 
  private:
   struct Entry {
+    Entry(LobeCache opened);
     LobeCache cache;
     DirectionGrid grid;
+    std::vector<Vec2> references;  ///< the directions that records were fitted for, on the disc
   };
   std::vector<Entry> caches_;
   std::vector<int> cacheOfRequest_;

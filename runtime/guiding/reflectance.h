@@ -14,6 +14,8 @@ struct Reflectance {
   float constant = 0;  ///< albedo/π of the diffuse part
   /// ∫ ρ p dA for p = 2cosθ/π, the light of a uniform environment: what the product makes of the background component.
   float backgroundMass = 0;
+  float albedo = 0;           ///< of all that the other fields describe
+  float uncoveredAlbedo = 0;  ///< of lobes that they do not describe
   int count = 0;
   std::array<Gaussian, kMaxReflectanceComponents> components;
 

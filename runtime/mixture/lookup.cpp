@@ -21,18 +21,27 @@ float largestStep(const Vec2& mean, const Vec2& step) {
   return std::clamp(t, 0.0f, 1.0f);
 }
 
+Gaussian mirrored(Gaussian g, const Alignment& alignment) {
+  if (alignment.mirrorX) g.meanX = -g.meanX;
+  if (alignment.mirrorY) g.meanY = -g.meanY;
+  if (alignment.mirrorX != alignment.mirrorY) g.cov.xy = -g.cov.xy;
+  return g;
+}
+
 }  // namespace
 
-std::span<Gaussian> alignMixture(const DirectionGrid& grid, int entry, std::span<const Gaussian> components,
-                                 const Vec3& wo, std::span<Gaussian> out) {
+std::span<Gaussian> alignMixture(const Alignment& alignment, std::span<const Gaussian> components, const Vec3& wo,
+                                 std::span<Gaussian> out) {
   out = out.first(components.size());
-  Vec2 reference = toDisc(grid.direction(entry));
-  if (grid.kind == GridKind::elevation) {
+  Vec2 reference = alignment.reference;
+  if (alignment.kind == GridKind::elevation) {
     const Vec2 azimuth = azimuthOf(wo);
-    reference = azimuth * reference.x();  // entries lie on the positive x axis
+    reference = azimuth * reference.x();  // elevations lie on the positive x axis
     for (std::size_t k = 0; k < out.size(); ++k) out[k] = rotated(components[k], azimuth);
   } else {
-    std::ranges::copy(components, out.begin());
+    if (alignment.mirrorX) reference.x() = -reference.x();
+    if (alignment.mirrorY) reference.y() = -reference.y();
+    for (std::size_t k = 0; k < out.size(); ++k) out[k] = mirrored(components[k], alignment);
   }
   const Vec2 step = reference - toDisc(wo);
   float t = 1.0f;

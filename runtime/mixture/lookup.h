@@ -1,5 +1,5 @@
 #pragma once
-// From the entry of a direction grid to the direction asked for: the look-up that renderer and fitter share.
+// From the direction that a mixture was fitted for to the one asked for: the look-up that renderer and fitter share.
 
 #include <span>
 
@@ -8,12 +8,19 @@
 
 namespace lobe {
 
-/// Brings the mixture that was fitted for grid.direction(entry) to wo (unit, z ≥ 0). Elevations are turned to wo's
-/// azimuth first. Then all means move by −(y(wo) − y(entry)), because the centre of a reflection lobe is near −y(wo);
-/// the step is shortened so that no mean that lies in the disc leaves it. Writes to the front of out, which has room
-/// for all components, and returns what was written. No allocation. (Herholz et al. 2016, Section 4; the sign is tested
-/// by NEV.)
-std::span<Gaussian> alignMixture(const DirectionGrid& grid, int entry, std::span<const Gaussian> components,
-                                 const Vec3& wo, std::span<Gaussian> out);
+/// How a fitted mixture is to be brought elsewhere.
+struct Alignment {
+  GridKind kind;
+  Vec2 reference;  ///< the direction it was fitted for, on the disc
+  /// The lobe is symmetric and the direction asked for is on the other side: mixture and reference are mirrored first.
+  bool mirrorX = false, mirrorY = false;
+};
+
+/// Brings the mixture to wo (unit, z ≥ 0). What was fitted for an elevation is turned to wo's azimuth first. Then all
+/// means move by −(y(wo) − y(reference)), because the centre of a reflection lobe is near −y(wo); the step is shortened
+/// so that no mean that lies in the disc leaves it. Writes to the front of out, which has room for all components, and
+/// returns what was written. No allocation. (Herholz et al. 2016, Section 4; the sign is tested by NEV.)
+std::span<Gaussian> alignMixture(const Alignment& alignment, std::span<const Gaussian> components, const Vec3& wo,
+                                 std::span<Gaussian> out);
 
 }  // namespace lobe

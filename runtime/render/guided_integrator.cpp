@@ -25,11 +25,16 @@ Eigen::Matrix3f guideAxes(const SurfaceHit& hit, const IlluminationRecord& recor
   return axes;
 }
 
-/// What was learnt is about the side of wo only: a share of the samples that may go through the surface is the BSDF's.
-StrategyShares onReflectedSide(const StrategyShares& shares, float transmittedShare) {
-  const float reflected = 1 - transmittedShare;
-  return {reflected * shares.product, 1 - reflected * (shares.product + shares.illumination),
-          reflected * shares.illumination};
+/// Samples for what the mixtures do not know are the BSDF's: light that goes through the surface, lobes too narrow.
+StrategyShares onCovered(const StrategyShares& shares, float covered) {
+  return {covered * shares.product, 1 - covered * (shares.product + shares.illumination),
+          covered * shares.illumination};
+}
+
+/// The share of reflection that the mixtures describe.
+float coveredShare(const Reflectance& reflectance) {
+  const float all = reflectance.albedo + reflectance.uncoveredAlbedo;
+  return all > 0 ? reflectance.albedo / all : 1.0f;
 }
 
 }  // namespace
@@ -62,13 +67,15 @@ GuidedSampler::Vertex::Vertex(const GuidedSampler& sampler, const SurfaceHit& hi
     collectReflectance(sampler, hit, mixture, side);
     shares = record->samples < kUncertainSamples ? kUncertainProductShares : kProductShares;
   }
-  density_.emplace(reflectance_, *record, onReflectedSide(shares, mixture.transmittedShare));
+  density_.emplace(reflectance_, *record,
+                   onCovered(shares, (1 - mixture.transmittedShare) * coveredShare(reflectance_)));
 }
 
 void GuidedSampler::Vertex::collectReflectance(const GuidedSampler& sampler, const SurfaceHit& hit,
                                                const LobeMixture& mixture, float side) {
   reflectance_.constant = mixture.constant * kInvPi;
   reflectance_.backgroundMass = reflectance_.constant;
+  reflectance_.albedo = mixture.constant;
   // On the back, lobes see the frame (s, −t, −n). The lobes we have are symmetric in t, so that this is theirs as well
   // as the mirrored (s, t, −n) of two-sided materials; for another lobe the density would be worse, not wrong.
   const Vec3 wo(hit.wo.x(), side * hit.wo.y(), side * hit.wo.z());
