@@ -34,6 +34,8 @@ std::vector<std::pair<std::string, std::string>> fieldsOf(const LobeCache& cache
           {"settings.samples", std::to_string(s.samples)},
           {"settings.reduction", fmt::format("{}", s.reduction)},
           {"settings.revision", std::to_string(s.revision)},
+          {"settings.quality", fmt::format("{}", s.quality)},
+          {"settings.fixed_grid", s.fixedGrid ? "yes" : "no"},
           {"grid.kind", gridName(grid)},
           {"grid.count", std::to_string(grid.count)}};
 }
@@ -74,7 +76,7 @@ Json recordJson(const LobeCache& cache, int index) {
 }
 
 Angles anglesAt(const LobeCache& cache, int index) {
-  return anglesOf(gridOf(cache).direction(index));
+  return anglesOf(directionOf(cache, static_cast<std::size_t>(index)));
 }
 
 void printFields(const CacheDifference& d, std::FILE* out) {
@@ -115,8 +117,9 @@ CacheDifference compareCaches(const LobeCache& a, const LobeCache& b) {
   const auto fieldsA = fieldsOf(a), fieldsB = fieldsOf(b);
   for (std::size_t i = 0; i < fieldsA.size(); ++i)
     if (fieldsA[i] != fieldsB[i]) d.fields.push_back({fieldsA[i].first, fieldsA[i].second, fieldsB[i].second});
-  for (int i = 0; i < gridA.count; ++i) {
-    RecordPair pair{i, d.sameGrid ? i : gridB.nearest(gridA.direction(i)), false};
+  for (std::size_t i = 0; i < a.records().size(); ++i) {
+    const auto entry = static_cast<std::uint32_t>(gridB.nearest(directionOf(a, i)));
+    RecordPair pair{static_cast<int>(i), static_cast<int>(b.lookup(entry).record), false};
     pair.same = sameRecord(a, b, pair);
     countQuality(d, recordOf(a, pair.a).nev, recordOf(b, pair.b).nev);
     d.records.push_back(pair);
@@ -129,7 +132,8 @@ void printDifference(const CacheDifference& d, const CachePair& caches, std::FIL
   if (d.equal) return fmt::print(out, "equal\n");
   if (!d.sameLobe) fmt::print(out, "These are different lobes.\n\n");
   printFields(d, out);
-  if (!d.sameGrid) fmt::print(out, "The grids differ: beside each record of A is the one of B that is nearest.\n\n");
+  if (!d.sameGrid)
+    fmt::print(out, "The grids differ: beside each record of A is the one of B that serves its direction.\n\n");
   printRecordPairs(d, caches, out);
   const LobeCacheInfo &a = caches.a.info(), &b = caches.b.info();
   printReports({{"A", "A " + a.summary, {}, summarise(caches.a)}, {"B", "B " + b.summary, {}, summarise(caches.b)}},

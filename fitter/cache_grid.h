@@ -17,6 +17,11 @@ inline const char* gridName(const DirectionGrid& grid) {
   return grid.kind == GridKind::elevation ? "elevation" : "fibonacci";
 }
 
+/// The direction that a record was fitted for.
+inline Vec3 directionOf(const LobeCache& cache, std::size_t record) {
+  return gridOf(cache).direction(static_cast<int>(cache.records()[record].entry));
+}
+
 /// In degrees, the elevation from the normal.
 struct Angles {
   double elevation, azimuth;

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include "fitter/adaptive_fit.h"
 #include "fitter/cache_mixture.h"
 #include "fitter/lobe_fit.h"
 #include "runtime/mixture/lookup.h"
@@ -25,9 +26,23 @@ void require(bool condition, const char* option, const std::string& range) {
 }
 
 DirectionGrid gridFor(const Lobe& lobe, const CompileOptions& options) {
-  if (lobe.kind() == LobeKind::isotropic) return {GridKind::elevation, options.elevations};
-  if (lobe.kind() == LobeKind::anisotropic) return {GridKind::fibonacci, options.directions};
+  if (lobe.kind() == LobeKind::isotropic) return {GridKind::elevation, options.elevations.value_or(kElevations)};
+  if (lobe.kind() == LobeKind::anisotropic) return {GridKind::fibonacci, options.directions.value_or(kDirections)};
   throw std::runtime_error(fmt::format("lobe {} is constant or a mirror: neither can be fitted", lobe.summary()));
+}
+
+/// Everything the fit depends on, as it is kept in the file.
+FitSettings settingsFor(const Lobe& lobe, const CompileOptions& options) {
+  FitSettings settings = options.settings;
+  settings.revision = kFitRevision;
+  const bool pinned =
+      lobe.kind() == LobeKind::isotropic ? options.elevations.has_value() : options.directions.has_value();
+  settings.fixedGrid = pinned || settings.method != kMethodAuto;
+  if (settings.method == kMethodAuto)
+    settings.reduction = 0;
+  else
+    settings.quality = 0;
+  return settings;
 }
 
 LobeCacheInfo infoFor(const Lobe& lobe, const DirectionGrid& grid, const FitSettings& settings) {
@@ -102,14 +117,51 @@ FittedRecord fitFromNeighbour(const Lobe& lobe, const DirectionGrid& grid, int e
                               const FittedRecord& fitted, const FitSettings& settings) {
   const Vec3 wo = grid.direction(entry);
   Mixture start(fitted.mixture.size());
-  alignMixture(grid, neighbour, fitted.mixture, wo, start);
+  alignMixture({grid.kind, toDisc(grid.direction(neighbour))}, fitted.mixture, wo, start);
   FittedRecord record = fitLobe(lobe, wo, settings, start);
   if (record.record.nevCoverage <= kWorseByFactor * fitted.record.nevCoverage + kWorseBy) return record;
   FittedRecord fresh = fitLobe(lobe, wo, settings);
   return fresh.record.nevCoverage < record.record.nevCoverage ? fresh : record;
 }
 
+/// A chain of directions; with method auto every record chooses its components for itself.
+void fitChain(const Lobe& lobe, const DirectionGrid& grid, const std::vector<int>& chain, const FitSettings& settings,
+              std::vector<FittedRecord>& fitted, const std::function<void()>& advance) {
+  for (std::size_t j = 0; j < chain.size(); ++j) {
+    FittedRecord& record = fitted[static_cast<std::size_t>(chain[j])];
+    if (settings.method == kMethodAuto)
+      record = fitWithFewest(lobe, grid.direction(chain[j]), settings);
+    else if (j == 0)
+      record = fitLobe(lobe, grid.direction(chain[j]), settings);
+    else
+      record = fitFromNeighbour(lobe, grid, chain[j], chain[j - 1], fitted[static_cast<std::size_t>(chain[j - 1])],
+                                settings);
+    if (advance) advance();
+  }
+}
+
+FittedGrid fitEveryEntry(const Lobe& lobe, const DirectionGrid& grid, const FitSettings& settings,
+                         const std::function<void()>& advance) {
+  std::vector<FittedRecord> fitted(static_cast<std::size_t>(grid.count));
+  const std::vector<std::vector<int>> chains = chainsOf(grid, settings);
+  tbb::parallel_for(std::size_t{0}, chains.size(),
+                    [&](std::size_t c) { fitChain(lobe, grid, chains[c], settings, fitted, advance); });
+  FittedGrid result;
+  for (std::uint32_t i = 0; i < fitted.size(); ++i) {
+    result.append(fitted[i], i);
+    result.lookup.push_back({i});
+  }
+  return result;
+}
+
 }  // namespace
+
+FitSettings defaultFitSettings() {
+  FitSettings settings;
+  settings.method = kMethodAuto;
+  settings.quality = 0.025f;
+  return settings;
+}
 
 void CompileOptions::validate() const {
   require(!directory.empty(), "--output", "the name of a folder");
@@ -119,8 +171,9 @@ void CompileOptions::validate() const {
   require(settings.samples >= kMinSamples && settings.samples <= kMaxSamples, "--samples",
           fmt::format("from {} to {}", kMinSamples, kMaxSamples));
   require(settings.reduction >= 0 && std::isfinite(settings.reduction), "--reduction", "0 or more");
-  require(elevations >= 1 && elevations <= kMaxRecords, "--elevations", fmt::format("from 1 to {}", kMaxRecords));
-  require(directions >= 1 && directions <= kMaxRecords, "--directions", fmt::format("from 1 to {}", kMaxRecords));
+  require(settings.quality > 0 && std::isfinite(settings.quality), "--quality", "over 0");
+  for (const auto& [count, option] : {std::pair{elevations, "--elevations"}, std::pair{directions, "--directions"}})
+    require(!count || (*count >= 1 && *count <= kMaxRecords), option, fmt::format("from 1 to {}", kMaxRecords));
 }
 
 std::vector<LobeUse> collectLobes(const Scene& scene) {
@@ -139,12 +192,10 @@ std::vector<LobeUse> collectLobes(const Scene& scene) {
 }
 
 std::vector<CompileJob> planCompile(const std::vector<LobeUse>& uses, const CompileOptions& options) {
-  FitSettings settings = options.settings;
-  settings.revision = kFitRevision;
   std::vector<CompileJob> jobs;
   for (const LobeUse& use : uses) {
     const DirectionGrid grid = gridFor(*use.lobe, options);
-    CompileJob job{use, grid, infoFor(*use.lobe, grid, settings), {}, false, {}};
+    CompileJob job{use, grid, infoFor(*use.lobe, grid, settingsFor(*use.lobe, options)), {}, false, {}};
     job.path = options.directory / lobeFileName(use.lobe->model(), use.lobe->key());
     check(job, options.force);
     jobs.push_back(std::move(job));
@@ -154,33 +205,15 @@ std::vector<CompileJob> planCompile(const std::vector<LobeUse>& uses, const Comp
 
 FittedGrid fitGrid(const Lobe& lobe, const DirectionGrid& grid, const FitSettings& settings,
                    const std::function<void()>& advance) {
-  std::vector<FittedRecord> fitted(static_cast<std::size_t>(grid.count));
-  const std::vector<std::vector<int>> chains = chainsOf(grid, settings);
-  tbb::parallel_for(std::size_t{0}, chains.size(), [&](std::size_t c) {
-    const std::vector<int>& chain = chains[c];
-    for (std::size_t j = 0; j < chain.size(); ++j) {
-      FittedRecord& record = fitted[static_cast<std::size_t>(chain[j])];
-      if (j == 0)
-        record = fitLobe(lobe, grid.direction(chain[j]), settings);
-      else
-        record = fitFromNeighbour(lobe, grid, chain[j], chain[j - 1], fitted[static_cast<std::size_t>(chain[j - 1])],
-                                  settings);
-      if (advance) advance();
-    }
-  });
-  FittedGrid result;
-  double integral = 0;
-  for (FittedRecord& f : fitted) {
-    f.record.first = static_cast<std::uint32_t>(result.components.size());
-    f.record.entry = static_cast<std::uint32_t>(result.records.size());
-    result.lookup.push_back({f.record.entry});
-    result.records.push_back(f.record);
-    for (const Gaussian& g : f.mixture) result.components.push_back(asComponent(g));
-    integral += f.record.integral;
-  }
-  if (!(integral > 0))
+  FittedGrid result =
+      settings.fixedGrid ? fitEveryEntry(lobe, grid, settings, advance) : fitAdaptively(lobe, grid, settings, advance);
+  if (std::ranges::none_of(result.records, [](const CacheRecord& r) { return r.integral > 0; }))
     throw std::runtime_error(fmt::format("lobe {} cannot be fitted: none of its samples has a value", lobe.summary()));
   return result;
+}
+
+int workOf(const CompileJob& job) {
+  return job.info.settings.fixedGrid ? job.grid.count : adaptiveDirections(*job.use.lobe, job.grid);
 }
 
 void runCompile(const CompileJob& job, const std::function<void()>& advance) {

@@ -3,9 +3,11 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "fitter/fitted_grid.h"
 #include "materials/lobe.h"
 #include "runtime/mixture/grid.h"
 #include "scenes/scene.h"
@@ -13,12 +15,18 @@
 
 namespace lobe {
 
+/// Method auto with the quality that charts of quality against time and size recommend.
+FitSettings defaultFitSettings();
+
+/// The grids where no option says otherwise; with method auto several directions may share a record.
+inline constexpr int kElevations = 64, kDirections = 512;
+
 struct CompileOptions {
   std::filesystem::path directory = "lobes";
-  FitSettings settings;
-  int elevations = 64;   ///< records of an isotropic lobe
-  int directions = 512;  ///< records of an anisotropic lobe
-  bool force = false;    ///< fit what is up to date again
+  FitSettings settings = defaultFitSettings();
+  std::optional<int> elevations;  ///< records of every isotropic lobe, whether it needs them or not
+  std::optional<int> directions;  ///< the same of anisotropic lobes
+  bool force = false;             ///< fit what is up to date again
 
   /// Throws std::runtime_error that names the option.
   void validate() const;
@@ -47,16 +55,16 @@ struct CompileJob {
 /// asked for.
 std::vector<CompileJob> planCompile(const std::vector<LobeUse>& uses, const CompileOptions& options);
 
+/// The number of calls of advance in runCompile.
+int workOf(const CompileJob& job);
+
 /// Fits every record of the job on all cores and writes the file (its folder is made); advance is called for every
-/// record, from any thread. The file's bytes do not depend on the number of threads. Throws std::runtime_error.
+/// direction looked at, from any thread. The file's bytes do not depend on the number of threads. Throws
+/// std::runtime_error.
 void runCompile(const CompileJob& job, const std::function<void()>& advance);
 
-/// The fit of every record of a grid, as runCompile writes it.
-struct FittedGrid {
-  std::vector<CacheRecord> records;
-  std::vector<CacheComponent> components;
-  std::vector<CacheLookup> lookup;  ///< of every entry of the grid
-};
+/// The fit of a lobe over a grid, as runCompile writes it. Throws std::runtime_error, also when nothing is reflected
+/// from any direction.
 FittedGrid fitGrid(const Lobe& lobe, const DirectionGrid& grid, const FitSettings& settings,
                    const std::function<void()>& advance = {});
 

@@ -143,9 +143,9 @@ Moments fromMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> 
 }  // namespace
 
 void requireMethod(const std::string& method) {
-  if (method == kMethodWem || method == kMethodCeres || method == kMethodEq8) return;
-  throw std::runtime_error(
-      fmt::format("--method must be {}, {} or {}, not '{}'", kMethodWem, kMethodCeres, kMethodEq8, method));
+  if (method == kMethodAuto || method == kMethodWem || method == kMethodCeres || method == kMethodEq8) return;
+  throw std::runtime_error(fmt::format("--method must be {}, {}, {} or {}, not '{}'", kMethodAuto, kMethodWem,
+                                       kMethodCeres, kMethodEq8, method));
 }
 
 Quality gradeMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> mixture, std::uint32_t samples) {

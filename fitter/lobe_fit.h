@@ -15,8 +15,9 @@ namespace lobe {
 /// Raised when the code of the fit changes what it returns; caches of another revision are stale.
 inline constexpr std::uint32_t kFitRevision = 2;
 
-/// FitSettings::method: weighted EM; least squares for the use in a product, by Ceres; least squares by the objective
-/// of Herholz et al. 2016, Eq. 8.
+/// FitSettings::method: as ceres, but with as little as is good enough (see adaptive_fit.h); weighted EM; least squares
+/// for the use in a product, by Ceres; least squares by the objective of Herholz et al. 2016, Eq. 8.
+inline constexpr const char* kMethodAuto = "auto";
 inline constexpr const char* kMethodWem = "wem";
 inline constexpr const char* kMethodCeres = "ceres";
 inline constexpr const char* kMethodEq8 = "eq8";

@@ -140,7 +140,7 @@ void printLegend(const LobeCache& cache, const Plot& plot, const Options& o) {
   for (std::size_t i = 0; i < plot.rows.size(); ++i) {
     const PlotRow& row = plot.rows[i];
     const CacheRecord& r = cache.records()[static_cast<std::size_t>(row.record)];
-    const Angles angles = anglesOf(gridOf(cache).direction(row.record));
+    const Angles angles = anglesOf(directionOf(cache, static_cast<std::size_t>(row.record)));
     table.add({std::to_string(i + 1), std::to_string(row.record), fmt::format("{:.2f}", angles.elevation),
                fmt::format("{:.2f}", angles.azimuth), std::to_string(r.count), fmt::format("{:.4f}", r.nev),
                fmt::format("{:.3f}", r.worstRatio), row.grade ? pointText(toDisc(row.grade->worstAt)) : "-",

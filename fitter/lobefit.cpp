@@ -27,15 +27,17 @@ struct Options {
 void declare(CLI::App& app, Options& o) {
   app.add_option("scene", o.scene, "Mitsuba scene file")->required()->type_name("SCENE.xml")->default_str("");
   app.add_option("-o,--output", o.compile.directory, "Folder of the cache files, made when missing")->type_name("DIR");
-  app.add_option(
-      "--method", o.compile.settings.method,
-      "How records are fitted: wem (weighted EM), ceres (least squares for the product) or eq8 (the paper's)");
-  app.add_option("--components", o.compile.settings.components, "Gaussians of a record before merging");
-  app.add_option("--elevations", o.compile.elevations, "Records of an isotropic lobe");
-  app.add_option("--directions", o.compile.directions, "Records of an anisotropic lobe");
+  app.add_option("--method", o.compile.settings.method,
+                 "How records are fitted: auto (what is enough for --quality), wem (weighted EM), ceres (least squares "
+                 "for the product) or eq8 (the paper's)");
+  app.add_option("--components", o.compile.settings.components, "Gaussians of a record, with auto at most so many");
+  app.add_option("--quality", o.compile.settings.quality,
+                 "With auto, the NEV of a record's use in a product that is good enough");
+  app.add_option("--elevations", o.compile.elevations, "So many records for every isotropic lobe, needed or not");
+  app.add_option("--directions", o.compile.directions, "So many records for every anisotropic lobe, needed or not");
   app.add_option("--samples", o.compile.settings.samples, "Samples drawn for a record");
   app.add_option("--reduction", o.compile.settings.reduction,
-                 "Merge components while the sum of Runnalls' costs stays below this; 0 keeps all");
+                 "Not with auto: merge components while the sum of Runnalls' costs stays below this; 0 keeps all");
   app.add_flag("--force", o.compile.force, "Fit again what is up to date");
   app.add_flag("--lenient", o.read.lenient, "Replace what the scene reader does not know, with a warning");
   app.add_flag("--json", o.json, "Print the table as JSON");
@@ -58,12 +60,12 @@ double secondsToRun(const CompileJob& job, Progress& progress) {
 }
 
 std::vector<CacheReport> compileAll(const std::vector<CompileJob>& jobs) {
-  double records = 0;
+  double directions = 0;
   for (const CompileJob& job : jobs) {
-    if (!job.upToDate) records += job.grid.count;
+    if (!job.upToDate) directions += workOf(job);
     if (!job.stale.empty()) fmt::print(stderr, "lobefit: {} is made again: {}\n", job.path.string(), job.stale);
   }
-  Progress progress("fitting", records);
+  Progress progress("fitting", directions);
   std::vector<CacheReport> reports;
   for (const CompileJob& job : jobs) {
     const double seconds = job.upToDate ? 0 : secondsToRun(job, progress);

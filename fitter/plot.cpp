@@ -52,7 +52,7 @@ class Subject {
   Subject(const LobeCache& cache, int index, const Lobe* lobe)
       : record_(cache.records()[static_cast<std::size_t>(index)]),
         mixture_(asGaussians(cache.components(record_))),
-        wo_(gridOf(cache).direction(index)),
+        wo_(directionOf(cache, static_cast<std::size_t>(index))),
         lobe_(lobe),
         samples_(cache.info().settings.samples) {}
 

@@ -25,9 +25,9 @@ std::string percent(double share) {
   return fmt::format("{:.2f} %", 100 * share);
 }
 
-Json recordJson(const LobeCache& cache, const DirectionGrid& grid, std::size_t index) {
+Json recordJson(const LobeCache& cache, std::size_t index) {
   const CacheRecord& r = cache.records()[index];
-  const Angles angles = anglesOf(grid.direction(static_cast<int>(index)));
+  const Angles angles = anglesOf(directionOf(cache, index));
   Json json{{"elevation", angles.elevation},
             {"azimuth", angles.azimuth},
             {"integral", shortNumber(r.integral)},
@@ -142,11 +142,13 @@ Json toJson(const LobeCache& cache, const std::filesystem::path& path) {
               {"components", info.settings.components},
               {"samples", info.settings.samples},
               {"reduction", shortNumber(info.settings.reduction)},
-              {"revision", info.settings.revision}}},
+              {"revision", info.settings.revision},
+              {"quality", shortNumber(info.settings.quality)},
+              {"fixed_grid", info.settings.fixedGrid}}},
             {"grid", {{"kind", gridName(grid)}, {"count", grid.count}}},
             {"summary", toJson(summarise(cache))},
             {"records", Json::array()}};
-  for (std::size_t i = 0; i < cache.records().size(); ++i) json["records"].push_back(recordJson(cache, grid, i));
+  for (std::size_t i = 0; i < cache.records().size(); ++i) json["records"].push_back(recordJson(cache, i));
   return json;
 }
 
@@ -159,18 +161,18 @@ void printHeader(const LobeCache& cache, const std::filesystem::path& path, std:
   fmt::print(out, "  key       {}\n", info.key);
   fmt::print(out, "  written   by Lobe {}, format {}.{}, hash {:016x}\n", info.toolVersion, cache.header().major,
              cache.header().minor, cache.hash());
-  fmt::print(out, "  fit       {}, {} components, {} samples, reduction {}, revision {}\n", s.method, s.components,
-             s.samples, s.reduction, s.revision);
-  fmt::print(out, "  grid      {}, {} directions\n", gridName(grid), grid.count);
+  fmt::print(out, "  fit       {}, {} components, {} samples, reduction {}, quality {}, revision {}\n", s.method,
+             s.components, s.samples, s.reduction, s.quality, s.revision);
+  fmt::print(out, "  grid      {}, {} directions, {}\n", gridName(grid), grid.count,
+             s.fixedGrid ? "a record each" : fmt::format("served by {} records", cache.records().size()));
 }
 
 void printRecords(const LobeCache& cache, std::FILE* out) {
-  const DirectionGrid grid = gridOf(cache);
   Table table({"record", "elevation", "azimuth", "comp.", "integral", "albedo", "cosine mass", "outside", "NEV",
                "coverage", "worst f/p"});
   for (std::size_t i = 0; i < cache.records().size(); ++i) {
     const CacheRecord& r = cache.records()[i];
-    const Angles angles = anglesOf(grid.direction(static_cast<int>(i)));
+    const Angles angles = anglesOf(directionOf(cache, i));
     table.add({std::to_string(i), fmt::format("{:.2f}", angles.elevation), fmt::format("{:.2f}", angles.azimuth),
                std::to_string(r.count), fmt::format("{:.5g}", r.integral), fmt::format("{:.5f}", r.albedo),
                fmt::format("{:.5f}", r.cosineMass), percent(r.outside), fmt::format("{:.4f}", r.nev),

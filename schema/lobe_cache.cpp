@@ -82,7 +82,7 @@ LobeCacheInfo readInfo(const fb::LobeCache& cache) {
   info.summary = cache.summary()->str();
   info.modelRevision = cache.model_revision();
   info.settings = {
-      s.method() ? s.method()->str() : "", s.components(), s.samples(), s.reduction(), s.revision(), s.quality()};
+      s.method() ? s.method()->str() : "", s.components(), s.samples(), s.reduction(), s.revision(), s.quality(), s.fixed_grid()};
   info.gridKind = cache.grid_kind();
   info.gridCount = cache.grid_count();
   return info;
@@ -137,7 +137,7 @@ std::vector<std::byte> encodeLobeCache(const LobeCacheInfo& info, std::span<cons
   flatbuffers::FlatBufferBuilder builder(1024 + records.size_bytes() + components.size_bytes());
   const FitSettings& s = info.settings;
   const auto settings = fb::CreateFitSettings(builder, builder.CreateString(s.method), s.components, s.samples,
-                                              s.reduction, s.revision, s.quality);
+                                              s.reduction, s.revision, s.quality, s.fixedGrid);
   // One after the other: the order in which arguments of a call are evaluated is the compiler's choice.
   const auto toolVersion = builder.CreateString(info.toolVersion);
   const auto model = builder.CreateString(info.model);

@@ -34,7 +34,8 @@ struct FitSettings {
   std::uint32_t samples = 4096;
   float reduction = 0.1f;
   std::uint32_t revision = 1;
-  float quality = 0;
+  float quality = 0;      ///< of method auto: an NEV that is good enough
+  bool fixedGrid = true;  ///< a record for every entry of the grid, whether it needs one or not
   bool operator==(const FitSettings&) const = default;
 };
 

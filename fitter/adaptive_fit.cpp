@@ -1,0 +1,221 @@
+#include "fitter/adaptive_fit.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <optional>
+
+#include <tbb/parallel_for.h>
+#include <Eigen/LU>
+
+#include "fitter/lobe_draws.h"
+#include "fitter/lobe_fit.h"
+#include "runtime/mixture/lookup.h"
+
+namespace lobe {
+namespace {
+
+// A look-up may have a second moment this much above that of a fit for the direction itself.
+constexpr double kLookUpSlack = 1.05;
+// More components have to lower the second moment by this factor to be worth their time at every look-up.
+constexpr double kWorthwhile = 0.98;
+// Numbers of components that are tried after one.
+constexpr std::array<std::uint32_t, 5> kSizes{2, 3, 4, 6, 8};
+// Decisions need fewer points than the grades that are stored.
+constexpr std::uint32_t kDecisionShare = 4;
+// A lobe of this standard deviation on the disc is a hundred times narrower than anything that illumination learns.
+constexpr double kNarrow = 0.004;
+constexpr std::uint32_t kNarrowRecords = 8;
+
+double worse(double nev, double coverage) {
+  return std::max(nev, coverage);
+}
+double secondMoment(const CacheRecord& record) {
+  return 1 + worse(record.nev, record.nevCoverage);
+}
+
+/// The standard deviation of the lobe across its narrower axis, for the direction of the normal.
+double widthOf(const Lobe& lobe) {
+  constexpr std::uint32_t points = 256;
+  const Vec3 wo = Vec3(0.01f, 0.01f, 1).normalized();
+  Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
+  double weight = 0;
+  for (const LobeDraw& d : drawLobe(lobe, wo, 0, points)) {
+    // The median would do as well; tails are cut, as a narrow peak with long tails is narrow.
+    const Eigen::Vector2d y = (toDisc(d.wi) + toDisc(wo)).cast<double>();
+    const double w = d.value / d.pdf / (1 + y.squaredNorm() / (kNarrow * kNarrow));
+    squares += w * y * y.transpose();
+    weight += w;
+  }
+  if (!(weight > 0)) return 1;
+  const Eigen::Matrix2d covariance = squares / weight;
+  const double half = 0.5 * covariance.trace();
+  return std::sqrt(std::max(0.0, half - std::sqrt(std::max(0.0, half * half - covariance.determinant()))));
+}
+
+bool usesQuarter(const Lobe& lobe, const DirectionGrid& grid) {
+  return grid.kind == GridKind::fibonacci && lobe.mirrorSymmetric();
+}
+
+/// The entries to be looked at, from coarse to fine: by the bits of their rank, the lowest first.
+std::vector<int> entriesOf(const Lobe& lobe, const DirectionGrid& grid) {
+  std::vector<int> candidates;
+  for (int i = 0; i < grid.count; ++i) {
+    const Vec3 w = grid.direction(i);
+    if (!usesQuarter(lobe, grid) || (w.x() >= 0 && w.y() >= 0)) candidates.push_back(i);
+  }
+  // Two directions on both sides of an axis may be the only ones there are.
+  if (candidates.empty()) candidates.push_back(0);
+  const std::size_t size = std::bit_ceil(candidates.size());
+  std::vector<int> ordered;
+  for (std::size_t i = 0; i < size; ++i) {
+    std::size_t reversed = 0;
+    for (std::size_t bit = 1, mirrored = size / 2; bit < size; bit *= 2, mirrored /= 2)
+      if (i & bit) reversed |= mirrored;
+    if (reversed < candidates.size()) ordered.push_back(candidates[reversed]);
+  }
+  return ordered;
+}
+
+bool goodEnough(const FittedRecord& fitted, const FitSettings& settings) {
+  return secondMoment(fitted.record) <= 1.0 + settings.quality;
+}
+
+FittedRecord refined(const Lobe& lobe, const Vec3& wo, FitSettings settings, std::span<const Gaussian> start) {
+  settings.method = kMethodCeres;
+  return fitLobe(lobe, wo, settings, start);
+}
+
+/// By weighted EM; by least squares from there where that is not good enough.
+FittedRecord fitWith(const Lobe& lobe, const Vec3& wo, std::uint32_t components, FitSettings settings) {
+  settings.method = kMethodWem;
+  settings.components = components;
+  FittedRecord fitted = fitLobe(lobe, wo, settings);
+  return goodEnough(fitted, settings) ? fitted : refined(lobe, wo, settings, fitted.mixture);
+}
+
+/// Tries more and more components than `best` has until they are good enough, and keeps more only if worth it.
+FittedRecord fitWithMore(const Lobe& lobe, const Vec3& wo, const FitSettings& settings, FittedRecord best) {
+  const std::uint32_t tried = best.record.count;
+  for (const std::uint32_t size : kSizes) {
+    if (goodEnough(best, settings)) break;
+    if (size <= tried || size > settings.components) continue;
+    FittedRecord fitted = fitWith(lobe, wo, size, settings);
+    if (secondMoment(fitted.record) < kWorthwhile * secondMoment(best.record)) best = std::move(fitted);
+  }
+  return best;
+}
+
+class AdaptiveFitter {
+ public:
+  AdaptiveFitter(const Lobe& lobe, const DirectionGrid& grid, const FitSettings& settings)
+      : lobe_(lobe), grid_(grid), settings_(settings) {}
+
+  /// Directions of one level know the records of the levels before, so that their order does not matter.
+  void fit(const std::function<void()>& advance) {
+    const std::vector<int> entries = entriesOf(lobe_, grid_);
+    for (std::size_t begin = 0; begin < entries.size();) {
+      const std::size_t end = std::min(entries.size(), std::max<std::size_t>(1, 2 * begin));
+      std::vector<std::optional<FittedRecord>> fitted(end - begin);
+      tbb::parallel_for(begin, end, [&](std::size_t i) {
+        fitted[i - begin] = fitWhereNeeded(entries[i]);
+        if (advance) advance();
+      });
+      for (std::size_t i = begin; i < end; ++i)
+        if (fitted[i - begin]) add(entries[i], std::move(*fitted[i - begin]));
+      begin = end;
+    }
+  }
+
+  void leaveToBsdf(const std::function<void()>& advance) {
+    const std::vector<int> entries = entriesOf(lobe_, grid_);
+    for (std::size_t i = 0; i < entries.size(); ++i) {
+      if (i < kNarrowRecords) add(entries[i], withoutComponents(entries[i]));
+      if (advance) advance();
+    }
+  }
+
+  FittedGrid result() const {
+    FittedGrid result;
+    for (const FittedRecord& f : records_) result.append(f, f.record.entry);
+    for (int i = 0; i < grid_.count; ++i) result.lookup.push_back(lookUp(grid_.direction(i)));
+    return result;
+  }
+
+ private:
+  CacheLookup lookUp(const Vec3& wo) const {
+    const bool quarter = usesQuarter(lobe_, grid_);
+    CacheLookup found{0, quarter && wo.x() < 0, quarter && wo.y() < 0};
+    const Vec2 y = toDisc(Vec3(found.mirrorX ? -wo.x() : wo.x(), found.mirrorY ? -wo.y() : wo.y(), wo.z()));
+    const auto nearest =
+        std::ranges::min_element(references_, {}, [&](const Vec2& reference) { return (reference - y).squaredNorm(); });
+    found.record = static_cast<std::uint32_t>(nearest - references_.begin());
+    return found;
+  }
+
+  std::optional<FittedRecord> fitWhereNeeded(int entry) const {
+    const Vec3 wo = grid_.direction(entry);
+    if (records_.empty()) return fitWithFewest(lobe_, wo, settings_);
+    const CacheLookup found = lookUp(wo);
+    const FittedRecord& neighbour = records_[found.record];
+    Mixture aligned(neighbour.mixture.size());
+    alignMixture({grid_.kind, references_[found.record]}, neighbour.mixture, wo, aligned);
+    const Quality served = gradeMixture(lobe_, wo, aligned, settings_.samples / kDecisionShare);
+    const double moment = 1 + worse(served.nev, served.coverage);
+    if (moment <= std::max(1.0 + settings_.quality, kLookUpSlack * secondMoment(neighbour.record))) return std::nullopt;
+    FittedRecord fitted = fitNear(wo, aligned);
+    // Where the lobe itself is hard to fit, another record would not help.
+    if (moment <= kLookUpSlack * secondMoment(fitted.record)) return std::nullopt;
+    return fitted;
+  }
+
+  FittedRecord fitNear(const Vec3& wo, const Mixture& start) const {
+    FittedRecord fitted = refined(lobe_, wo, settings_, start);
+    if (goodEnough(fitted, settings_)) return fitted;
+    return fitWithMore(lobe_, wo, settings_, std::move(fitted));
+  }
+
+  FittedRecord withoutComponents(int entry) const {
+    FittedRecord fitted;
+    for (const LobeDraw& d : drawLobe(lobe_, grid_.direction(entry), 0, settings_.samples)) {
+      fitted.record.integral += static_cast<float>(d.value / d.pdf / settings_.samples);
+      fitted.record.albedo += static_cast<float>(d.value * d.wi.z() / d.pdf / settings_.samples);
+    }
+    return fitted;
+  }
+
+  void add(int entry, FittedRecord fitted) {
+    fitted.record.entry = static_cast<std::uint32_t>(entry);
+    references_.push_back(toDisc(grid_.direction(entry)));
+    records_.push_back(std::move(fitted));
+  }
+
+  const Lobe& lobe_;
+  const DirectionGrid& grid_;
+  const FitSettings& settings_;
+  std::vector<FittedRecord> records_;
+  std::vector<Vec2> references_;  // of the records
+};
+
+}  // namespace
+
+FittedRecord fitWithFewest(const Lobe& lobe, const Vec3& wo, const FitSettings& settings) {
+  return fitWithMore(lobe, wo, settings, fitWith(lobe, wo, 1, settings));
+}
+
+int adaptiveDirections(const Lobe& lobe, const DirectionGrid& grid) {
+  return static_cast<int>(entriesOf(lobe, grid).size());
+}
+
+FittedGrid fitAdaptively(const Lobe& lobe, const DirectionGrid& grid, const FitSettings& settings,
+                         const std::function<void()>& advance) {
+  AdaptiveFitter fitter(lobe, grid, settings);
+  if (widthOf(lobe) < kNarrow)
+    fitter.leaveToBsdf(advance);
+  else
+    fitter.fit(advance);
+  return fitter.result();
+}
+
+}  // namespace lobe
