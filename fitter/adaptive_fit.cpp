@@ -95,12 +95,12 @@ FittedRecord fitWith(const Lobe& lobe, const Vec3& wo, std::uint32_t components,
   return goodEnough(fitted, settings) ? fitted : refined(lobe, wo, settings, fitted.mixture);
 }
 
-/// Tries more and more components than `best` has until they are good enough, and keeps more only if worth it.
-FittedRecord fitWithMore(const Lobe& lobe, const Vec3& wo, const FitSettings& settings, FittedRecord best) {
-  const std::uint32_t tried = best.record.count;
+/// Tries `first` and more components until they are good enough, and keeps more only if worth it.
+FittedRecord fitWithMore(const Lobe& lobe, const Vec3& wo, const FitSettings& settings, FittedRecord best,
+                         std::uint32_t first) {
   for (const std::uint32_t size : kSizes) {
     if (goodEnough(best, settings)) break;
-    if (size <= tried || size > settings.components) continue;
+    if (size < first || size > settings.components) continue;
     FittedRecord fitted = fitWith(lobe, wo, size, settings);
     if (secondMoment(fitted.record) < kWorthwhile * secondMoment(best.record)) best = std::move(fitted);
   }
@@ -173,7 +173,9 @@ class AdaptiveFitter {
   FittedRecord fitNear(const Vec3& wo, const Mixture& start) const {
     FittedRecord fitted = refined(lobe_, wo, settings_, start);
     if (goodEnough(fitted, settings_)) return fitted;
-    return fitWithMore(lobe_, wo, settings_, std::move(fitted));
+    // With as many components again: a start from far away may lead nowhere.
+    const std::uint32_t first = fitted.record.count;
+    return fitWithMore(lobe_, wo, settings_, std::move(fitted), first);
   }
 
   FittedRecord withoutComponents(int entry) const {
@@ -201,7 +203,7 @@ class AdaptiveFitter {
 }  // namespace
 
 FittedRecord fitWithFewest(const Lobe& lobe, const Vec3& wo, const FitSettings& settings) {
-  return fitWithMore(lobe, wo, settings, fitWith(lobe, wo, 1, settings));
+  return fitWithMore(lobe, wo, settings, fitWith(lobe, wo, 1, settings), 2);
 }
 
 int adaptiveDirections(const Lobe& lobe, const DirectionGrid& grid) {

@@ -59,9 +59,9 @@ LobeCache singleRecord(const fs::path& path, const Lobe& lobe, const Gaussian& g
   CacheRecord record = fitLobe(lobe, grid.direction(0), info.settings).record;
   record.count = 1;
   record.cosineMass = static_cast<float>(discMass(std::span(&g, 1)).cosine);
-  writeAtomically(path,
-                  encodeLobeCache(info, std::vector{record},
-                                  std::vector{CacheComponent{1, g.meanX, g.meanY, g.cov.xx, g.cov.xy, g.cov.yy}}));
+  writeAtomically(path, encodeLobeCache(info, std::vector{record},
+                                        std::vector{CacheComponent{1, g.meanX, g.meanY, g.cov.xx, g.cov.xy, g.cov.yy}},
+                                        std::vector<CacheLookup>{{0}}));
   return LobeCache::open(path);
 }
 

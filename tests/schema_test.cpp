@@ -229,7 +229,6 @@ TEST_CASE("schema: faults of meaning are refused") {
       {"components out of range", [](Content& c) { c.records[1].first = 0xffffffffu; }},
       {"direction out of range", [](Content& c) { c.records[1].entry = 2; }},
       {"record out of range", [](Content& c) { c.lookup[0].record = 2; }},
-      {"2 look-ups", [](Content& c) { c.info.gridCount = 3; }},
       {"number of components", [](Content& c) { c.records[0].count = kMaxCacheComponents + 1; }},
       {"not finite", [&](Content& c) { c.records[0].nev = nan; }},
       {"not finite", [&](Content& c) { c.records[0].worstRatio = nan; }},
@@ -237,9 +236,9 @@ TEST_CASE("schema: faults of meaning are refused") {
       {"negative quantity", [](Content& c) { c.records[1].worstRatio = -1; }},
       {"outside the disc", [](Content& c) { c.records[0].outside = 1.5f; }},
       {"cosine mass", [](Content& c) { c.records[0].cosineMass = 0; }},
-      {"records for a grid", [](Content& c) { c.info.gridCount = 3; }},
+      {"look-ups for a grid", [](Content& c) { c.info.gridCount = 3; }},
       {"unknown kind", [](Content& c) { c.info.gridKind = 2; }},
-      {"records for a grid", [](Content& c) { c.info.gridCount = 0, c.records.clear(); }},
+      {"look-ups for a grid", [](Content& c) { c.info.gridCount = 0, c.records.clear(); }},
   };
   for (const Fault& fault : faults) {
     Content content = smallCache();

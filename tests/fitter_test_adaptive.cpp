@@ -1,0 +1,103 @@
+// The fit that chooses records and components for itself.
+
+#include <catch2/catch.hpp>
+#include <tbb/global_control.h>
+
+#include "fitter/adaptive_fit.h"
+#include "fitter/cache_mixture.h"
+#include "fitter/compile.h"
+#include "fitter_test_lobes.h"
+#include "runtime/mixture/lookup.h"
+
+using namespace lobe;
+
+namespace {
+
+Vec3 direction(double elevation, double azimuth) {
+  const double t = elevation * std::numbers::pi / 180, p = azimuth * std::numbers::pi / 180;
+  return Vec3(static_cast<float>(std::sin(t) * std::cos(p)), static_cast<float>(std::sin(t) * std::sin(p)),
+              static_cast<float>(std::cos(t)));
+}
+
+/// What a look-up for wo is worth.
+Quality served(const Lobe& lobe, const DirectionGrid& grid, const FittedGrid& fit, const Vec3& wo) {
+  const CacheLookup found = fit.lookup[static_cast<std::size_t>(grid.nearest(wo))];
+  const CacheRecord& record = fit.records[found.record];
+  const Alignment alignment{grid.kind, toDisc(grid.direction(static_cast<int>(record.entry))), found.mirrorX,
+                            found.mirrorY};
+  std::array<Gaussian, kMaxCacheComponents> room;
+  const auto fitted = asGaussians(fit.components).subspan(record.first, record.count);
+  return gradeMixture(lobe, wo, alignMixture(alignment, fitted, wo, room), 2048);
+}
+
+double meanComponents(const FittedGrid& fit) {
+  return static_cast<double>(fit.components.size()) / static_cast<double>(fit.records.size());
+}
+
+}  // namespace
+
+TEST_CASE("fitter: directions between the records are served as well as asked for") {
+  const FitSettings settings = defaultFitSettings();
+  const double alpha = GENERATE(0.05, 0.3);
+  const LobePtr lobe = conductorLobe(alpha, alpha);
+  const DirectionGrid grid{GridKind::elevation, 64};
+  const FittedGrid fit = fitAdaptively(*lobe, grid, settings);
+  CHECK(fit.records.size() <= 24);
+  CHECK(meanComponents(fit) <= 6);
+  for (const double elevation : {0.0, 7.0, 21.0, 33.0, 48.0, 62.0, 75.0, 84.0, 88.0}) {
+    CAPTURE(alpha, elevation);
+    CHECK(served(*lobe, grid, fit, direction(elevation, 77)).coverage < 4 * settings.quality);
+  }
+}
+
+TEST_CASE("fitter: less quality needs less") {
+  const LobePtr lobe = conductorLobe(0.2, 0.2);
+  const DirectionGrid grid{GridKind::elevation, 64};
+  FitSettings settings = defaultFitSettings();
+  const FittedGrid fine = fitAdaptively(*lobe, grid, settings);
+  settings.quality = 0.3f;
+  const FittedGrid coarse = fitAdaptively(*lobe, grid, settings);
+  CHECK(coarse.components.size() < fine.components.size() / 2);
+}
+
+TEST_CASE("fitter: an anisotropic lobe is fitted for a quarter of the directions and served for all") {
+  const LobePtr lobe = conductorLobe(0.1, 0.3);
+  const DirectionGrid grid{GridKind::fibonacci, 128};
+  FitSettings settings = defaultFitSettings();
+  settings.quality = 0.1f;
+  const FittedGrid fit = fitAdaptively(*lobe, grid, settings);
+  CHECK(fit.lookup.size() == 128);
+  for (const CacheRecord& record : fit.records) {
+    const Vec3 w = grid.direction(static_cast<int>(record.entry));
+    CHECK((w.x() >= 0 && w.y() >= 0));
+  }
+  // The four directions that mirroring makes of one are alike.
+  for (const double elevation : {20.0, 55.0, 75.0}) {
+    for (const double azimuth : {30.0, 150.0, 210.0, 330.0}) {
+      CAPTURE(elevation, azimuth);
+      CHECK(served(*lobe, grid, fit, direction(elevation, azimuth)).coverage < 0.5);
+    }
+  }
+}
+
+TEST_CASE("fitter: a lobe that is next to a mirror is left to the BSDF") {
+  const LobePtr lobe = conductorLobe(0.001, 0.001);
+  const FittedGrid fit = fitAdaptively(*lobe, {GridKind::elevation, 64}, defaultFitSettings());
+  CHECK(fit.components.empty());
+  CHECK_FALSE(fit.records.empty());
+  for (const CacheRecord& record : fit.records) CHECK(record.albedo > 0.3f);
+  for (const CacheLookup& lookup : fit.lookup) CHECK(lookup.record < fit.records.size());
+}
+
+TEST_CASE("fitter: what is chosen does not depend on the number of threads") {
+  const LobePtr lobe = conductorLobe(0.1, 0.1);
+  std::vector<FittedGrid> fits;
+  for (const std::size_t threads : {1u, 2u}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    fits.push_back(fitAdaptively(*lobe, {GridKind::elevation, 16}, defaultFitSettings()));
+  }
+  REQUIRE(fits[0].records.size() == fits[1].records.size());
+  CHECK(fits[0].lookup == fits[1].lookup);
+  for (std::size_t i = 0; i < fits[0].components.size(); ++i)
+    CHECK(fits[0].components[i].meanX == fits[1].components[i].meanX);
+}
