@@ -13,12 +13,6 @@ using namespace lobe;
 
 namespace {
 
-Vec3 direction(double elevation, double azimuth) {
-  const double t = elevation * std::numbers::pi / 180, p = azimuth * std::numbers::pi / 180;
-  return Vec3(static_cast<float>(std::sin(t) * std::cos(p)), static_cast<float>(std::sin(t) * std::sin(p)),
-              static_cast<float>(std::cos(t)));
-}
-
 /// What a look-up for wo is worth.
 Quality served(const Lobe& lobe, const DirectionGrid& grid, const FittedGrid& fit, const Vec3& wo) {
   const CacheLookup found = fit.lookup[static_cast<std::size_t>(grid.nearest(wo))];
