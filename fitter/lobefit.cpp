@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 #include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
 #include <nlohmann/json.hpp>
 
 #include "fitter/compile.h"
@@ -66,12 +67,14 @@ std::vector<CacheReport> compileAll(const std::vector<CompileJob>& jobs) {
     if (!job.stale.empty()) fmt::print(stderr, "lobefit: {} is made again: {}\n", job.path.string(), job.stale);
   }
   Progress progress("fitting", directions);
-  std::vector<CacheReport> reports;
-  for (const CompileJob& job : jobs) {
+  std::vector<CacheReport> reports(jobs.size());
+  // Lobes beside each other, too: the first few directions of each have nothing to share cores with.
+  tbb::parallel_for(std::size_t{0}, jobs.size(), [&](std::size_t i) {
+    const CompileJob& job = jobs[i];
     const double seconds = job.upToDate ? 0 : secondsToRun(job, progress);
     const LobeCache cache = LobeCache::open(job.path);
-    reports.push_back({job.path, job.info.summary, job.use.materials, summarise(cache), job.upToDate, seconds});
-  }
+    reports[i] = {job.path, job.info.summary, job.use.materials, summarise(cache), job.upToDate, seconds};
+  });
   return reports;
 }
 
