@@ -105,6 +105,7 @@ void run(Options& o) {
   if (o.threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(o.threads));
   o.read.geometry = false;
   const Scene scene = readScene(o.scene, o.read);
+  for (const std::string& note : scene.notes) printNote("lobefit", note);
   for (const std::string& warning : scene.warnings) printWarning("lobefit", warning);
   const std::vector<CacheReport> reports = compileAll(planCompile(collectLobes(scene), o.compile));
   say(reports, o);

@@ -73,7 +73,12 @@ Rgb Parameters::colour(std::string_view name, const Rgb& fallback) const {
 TexturePtr Parameters::texture(std::string_view name, const Rgb& fallback) const {
   if (const Entry* entry = find(name))
     if (const TexturePtr* value = std::get_if<TexturePtr>(&entry->value)) return *value;
-  return constantTexture(colour(name, fallback));
+  const Rgb constant = colour(name, fallback);
+  // Negated, so that it holds for what is no number.
+  if (!((constant >= 0.0f).all() && constant.allFinite()))
+    throw ParameterError(std::string(name), fmt::format("{} must be finite and not negative, but is {} {} {}", name,
+                                                        constant.x(), constant.y(), constant.z()));
+  return constantTexture(constant);
 }
 
 TexturePtr Parameters::onlyTexture() const {

@@ -46,7 +46,8 @@ class Parameters {
   double number(std::string_view name, double fallback) const;
   std::string text(std::string_view name, std::string fallback) const;
   Rgb colour(std::string_view name, const Rgb& fallback) const;          ///< from rgb, or a number as grey
-  TexturePtr texture(std::string_view name, const Rgb& fallback) const;  ///< from texture, rgb or number
+  /// From texture, rgb or number; ParameterError also where one of the latter is negative or not finite.
+  TexturePtr texture(std::string_view name, const Rgb& fallback) const;
   Eigen::Matrix4d transform(std::string_view name) const;                ///< identity when missing
   /// The only texture among the parameters, whatever its name (a nested texture may have none); ParameterError when
   /// there are none or several.

@@ -7,9 +7,9 @@ namespace {
 
 void check(const char* name, const Rgb& colour) {
   // Negated, so that it holds for what is no number.
-  if (!(colour.minCoeff() >= 0.0f))
-    throw ParameterError(
-        name, fmt::format("{} must not be negative, but is {} {} {}", name, colour.x(), colour.y(), colour.z()));
+  if (!((colour >= 0.0f).all() && (colour <= kLargestEmission).all()))
+    throw ParameterError(name, fmt::format("{} must be neither negative nor over {:g}, but is {} {} {}", name,
+                                           kLargestEmission, colour.x(), colour.y(), colour.z()));
 }
 
 }  // namespace
@@ -28,7 +28,9 @@ TexturePtr emissionTexture(const Parameters& parameters, const char* name, const
 
 double emissionScale(const Parameters& parameters, const char* name, double fallback) {
   const double scale = parameters.number(name, fallback);
-  if (!(scale >= 0.0)) throw ParameterError(name, fmt::format("{} must not be negative, not {}", name, scale));
+  if (!(scale >= 0.0 && scale <= kLargestEmission))
+    throw ParameterError(
+        name, fmt::format("{} must be neither negative nor over {:g}, not {}", name, kLargestEmission, scale));
   return scale;
 }
 

@@ -6,7 +6,10 @@
 
 namespace lobe {
 
-/// Throw ParameterError where the emission would be negative (of a texture: on average), or not a number.
+/// More would overflow once it is summed over areas, directions and samples.
+inline constexpr float kLargestEmission = 1e30f;
+
+/// Throw ParameterError where the emission would be negative, too large (of a texture: on average), or not a number.
 Rgb emission(const Parameters& parameters, const char* name, const Rgb& fallback);
 TexturePtr emissionTexture(const Parameters& parameters, const char* name, const Rgb& fallback);
 double emissionScale(const Parameters& parameters, const char* name, double fallback);

@@ -16,6 +16,12 @@ BsdfPtr makeDiffuseOf(float reflectance) {
   return makeBsdf("diffuse", parameters);
 }
 
+/// What Mitsuba 3 changed: a metal that is not named is a perfect mirror (η 0, k 1) rather than copper.
+void setDefaultsOfToday(const std::string& type, Parameters& parameters) {
+  if ((type == "conductor" || type == "roughconductor") && !parameters.has("material"))
+    parameters.set("material", std::string("none"));
+}
+
 bool namesMeasurement(pugi::xml_node node) {
   const std::string_view type = node.attribute("type").value();
   return elementName(node) == "bsdf" && (type == "measured" || type == "merl");
@@ -53,6 +59,7 @@ BsdfPtr MaterialReader::make(pugi::xml_node node) {
     return true;
   };
   Parameters parameters = readParameters(context_, node, "texture, bsdf, ref", onChild);
+  if (context_.file.isOfToday()) setDefaultsOfToday(type, parameters);
   if (namesMeasurement(node) && !resolveFile(node, parameters)) return makeDiffuseOf(0.5f);
   return makeFrom(context_, node, parameters, [&](const Parameters& p) { return makeBsdf(type, p); });
 }

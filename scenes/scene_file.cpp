@@ -2,6 +2,7 @@
 
 #include <cctype>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <sstream>
@@ -116,6 +117,10 @@ void SceneFile::indexIds(pugi::xml_node node) {
     }
     indexIds(child);
   }
+}
+
+bool SceneFile::isOfToday() const {
+  return std::strtol(scene_.attribute("version").value(), nullptr, 10) >= 2;
 }
 
 pugi::xml_node SceneFile::byId(const std::string& id) const {

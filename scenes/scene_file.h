@@ -22,6 +22,9 @@ class SceneFile {
 
   pugi::xml_node scene() const { return scene_; }
 
+  /// Written for Mitsuba 3 (or 2), by the scene's version; some defaults differ. Without a version it is an older one.
+  bool isOfToday() const;
+
   /// The element with this id; null when there is none.
   pugi::xml_node byId(const std::string& id) const;
 

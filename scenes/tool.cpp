@@ -58,6 +58,10 @@ void printWarning(const std::string& name, const std::string& message) {
   fmt::print(stderr, "{}: warning: {}\n", name, message);
 }
 
+void printNote(const std::string& name, const std::string& message) {
+  fmt::print(stderr, "{}: note: {}\n", name, message);
+}
+
 void addDefinitions(CLI::App& app, std::map<std::string, std::string>& definitions) {
   const auto parse = [&definitions](const std::string& text) {
     const std::size_t equals = text.find('=');

@@ -30,6 +30,9 @@ int runTool(const std::string& name, const std::string& description, int argc, c
 /// Prints "NAME: warning: MESSAGE" to stderr.
 void printWarning(const std::string& name, const std::string& message);
 
+/// Prints "NAME: note: MESSAGE" to stderr.
+void printNote(const std::string& name, const std::string& message);
+
 /// -D name=value, any number of times, into definitions.
 void addDefinitions(CLI::App& app, std::map<std::string, std::string>& definitions);
 

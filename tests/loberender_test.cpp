@@ -94,6 +94,19 @@ double number(const Imf::Header& header, const char* name) {
 
 }  // namespace
 
+TEST_CASE("loberender and lobefit: what the scene has and we replace is noted") {
+  const SceneFolder folder(false);
+  std::string text = kScene;
+  text.insert(text.find("<sensor"), "<integrator type=\"volpath\"/>");
+  folder.write("scene.xml", text);
+  for (const std::string tool : {"loberender", "lobefit"}) {
+    const ToolRun run =
+        folder.run(tool == "lobefit" ? kQuickFit : "loberender scene.xml -o a.exr --integrator path --spp 1");
+    CAPTURE(run.error);
+    CHECK(run.error.starts_with(tool + ": note: integrator \"volpath\" is replaced"));
+  }
+}
+
 TEST_CASE("loberender: missing caches are named with the command that makes them") {
   const SceneFolder folder(false);
   const std::string line = fault(folder, kRender, 1);

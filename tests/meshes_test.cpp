@@ -485,13 +485,42 @@ TEST_CASE("scenes: broken OBJ files are refused by name") {
   REQUIRE_THAT(fault(vertices + "f 1//1 2//1 3//-2\n"), Contains("normal"));
   REQUIRE_THAT(fault("v 0 0 0\nv nan 0 0\n"), Contains("line 2"));
   REQUIRE_THAT(fault("v 0 0 0\n\nv 1 0\n"), Contains("line 3"));
-  REQUIRE_THAT(fault(vertices + "f a b c\n"), Contains("line 6"));
+  REQUIRE_THAT(fault(vertices + "f a b c\n"), Contains("line 6") && Contains("\"a\""));
+  REQUIRE_THAT(fault(vertices + "f 99999999999999999999 1 2\n"), Contains("line 6") && Contains("999 1 2"));
+  REQUIRE_THAT(fault(vertices + "f 1 2 3/1/1/1\n"), Contains("\"3/1/1/1\""));
+  REQUIRE_THAT(fault(vertices + "\n\nf 1 2\n"), Contains("line 8") && Contains("three corners"));
   REQUIRE_THAT(fault("v 0 0 1e99\nv 0 1 0\nv 1 0 0\nf 1 2 3\n"), Contains("not a finite number"));
   REQUIRE_THAT(fault(vertices), Contains("no triangles"));
   REQUIRE_THAT(fault(""), Contains("no triangles"));
   REQUIRE_THAT(fault(std::string("\0\x7f\xff\n\0v f\n", 10)), Contains("no triangles"));
   REQUIRE_THAT(faultOf([&] { readObj(folder / "none.obj", {}); }), Contains("none.obj: no such file"));
   REQUIRE_THAT(faultOf([&] { readObj(folder / ".", {}); }), Contains("not a file"));
+}
+
+TEST_CASE("scenes: OBJ files of many hands") {
+  const Folder folder;
+  const auto read = [&folder](const std::string& text) { return readObj(folder.write("a.obj", text), {}); };
+  const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.5 0.25\nvn 1 0 0\n";
+  const std::string face = "f 1/1/1 2/1/1 3/1/1\n";
+  const auto withEnds = [](std::string text, const std::string& end) {
+    for (std::size_t i = 0; (i = text.find('\n', i)) != std::string::npos; i += end.size()) text.replace(i, 1, end);
+    return text;
+  };
+  for (const std::string& text :
+       {vertices + face, "\xef\xbb\xbf" + vertices + face, withEnds(vertices + face, "\r"),
+        withEnds(vertices + face, "\r\n"), face + vertices, vertices + "f 1/1/1 \\\n 2/1/1 \\\r\n3/1/1 # end",
+        "v 0 0 0 1 \\\n0.5 0\n" + vertices + "f -3/-1/-1 -2/-1/-1 +4/1/1"}) {
+    CAPTURE(text);
+    const TriangleMesh mesh = read(text);
+    REQUIRE(mesh.triangles.size() == 1);
+    REQUIRE(mesh.positions[1] == Vec3(1, 0, 0));
+    REQUIRE(mesh.uvs[2] == Vec2(0.5f, 0.75f));
+    REQUIRE(mesh.normals[0] == Vec3(1, 0, 0));
+  }
+  REQUIRE(read(vertices + "f 1/1/ 2/1/ 3/1/\n").normals[0] == Vec3::UnitZ());
+  const TriangleMesh broken = read(vertices + "vt nan 0\nvn nan -nan(ind) 0\nf 1/2/2 2/1/1 3/1/1\n");
+  REQUIRE(broken.uvs[0] == Vec2(0, 0));
+  REQUIRE(broken.normals[0] == Vec3::UnitZ());
 }
 
 // ---- PLY

@@ -70,6 +70,7 @@ Scene readFor(const RenderJob& job) {
   Progress progress("reading", 1.0);
   Scene scene =
       readScene(job.scene, {job.definitions, job.lenient, true, [&](double share) { progress.advance(share); }});
+  for (const std::string& note : scene.notes) printNote(kTool, note);
   for (const std::string& warning : scene.warnings) printWarning(kTool, warning);
   if (job.size) {
     if (scene.camera.crop) printWarning(kTool, "--size is that of the whole film: the file's crop is dropped");
