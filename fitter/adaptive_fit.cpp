@@ -16,10 +16,9 @@
 namespace lobe {
 namespace {
 
-// A look-up may have a second moment this much above that of a fit for the direction itself.
-constexpr double kLookUpSlack = 1.05;
-// More components have to lower the second moment by this factor to be worth their time at every look-up.
-constexpr double kWorthwhile = 0.98;
+// More components have to lower the second moment by this share of the quality asked for, to be worth their time at
+// every look-up.
+constexpr double kWorthwhile = 0.25;
 // Numbers of components that are tried after one.
 constexpr std::array<std::uint32_t, 5> kSizes{2, 3, 4, 6, 8};
 // Decisions need fewer points than the grades that are stored.
@@ -102,7 +101,8 @@ FittedRecord fitWithMore(const Lobe& lobe, const Vec3& wo, const FitSettings& se
     if (goodEnough(best, settings)) break;
     if (size < first || size > settings.components) continue;
     FittedRecord fitted = fitWith(lobe, wo, size, settings);
-    if (secondMoment(fitted.record) < kWorthwhile * secondMoment(best.record)) best = std::move(fitted);
+    const double gain = 1 - secondMoment(fitted.record) / secondMoment(best.record);
+    if (gain > kWorthwhile * settings.quality) best = std::move(fitted);
   }
   return best;
 }
@@ -163,10 +163,12 @@ class AdaptiveFitter {
     alignMixture({grid_.kind, references_[found.record]}, neighbour.mixture, wo, aligned);
     const Quality served = gradeMixture(lobe_, wo, aligned, settings_.samples / kDecisionShare);
     const double moment = 1 + worse(served.nev, served.coverage);
-    if (moment <= std::max(1.0 + settings_.quality, kLookUpSlack * secondMoment(neighbour.record))) return std::nullopt;
+    // A look-up may be worse than a fit for the direction itself by as much as a fit may be worse than the lobe.
+    const double slack = 1.0 + settings_.quality;
+    if (moment <= slack * secondMoment(neighbour.record)) return std::nullopt;
     FittedRecord fitted = fitNear(wo, aligned);
     // Where the lobe itself is hard to fit, another record would not help.
-    if (moment <= kLookUpSlack * secondMoment(fitted.record)) return std::nullopt;
+    if (moment <= slack * secondMoment(fitted.record)) return std::nullopt;
     return fitted;
   }
 

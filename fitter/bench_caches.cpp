@@ -1,0 +1,142 @@
+// lobebench-caches: whole caches by several ways to fit: time, size, and the quality that look-ups between records
+// meet.
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <vector>
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+#include <nlohmann/json.hpp>
+
+#include "fitter/cache_mixture.h"
+#include "fitter/compile.h"
+#include "runtime/mixture/lookup.h"
+#include "scenes/reader.h"
+#include "scenes/tool.h"
+
+namespace {
+
+using namespace lobe;
+
+constexpr std::uint32_t kGradeSamples = 8192;
+constexpr int kDirections = 24;
+constexpr double kLastElevation = 88;
+
+struct Options {
+  std::string scene;
+  std::vector<std::string> ways;
+  ReadOptions read;
+};
+
+/// "wem", "ceres", "eq8", or "auto:QUALITY".
+CompileOptions optionsOf(const std::string& way) {
+  CompileOptions options;
+  options.settings.reduction = 0;
+  options.settings.method = way.substr(0, way.find(':'));
+  if (const std::size_t colon = way.find(':'); colon != std::string::npos)
+    options.settings.quality = std::stof(way.substr(colon + 1));
+  options.validate();
+  return options;
+}
+
+/// Even in elevation, at azimuths that favour none; none of them is a grid's.
+Vec3 queryDirection(int i) {
+  const double theta = kLastElevation * (i + 0.5) / kDirections * std::numbers::pi / 180, phi = 2.4 * i + 0.3;
+  return {static_cast<float>(std::sin(theta) * std::cos(phi)), static_cast<float>(std::sin(theta) * std::sin(phi)),
+          static_cast<float>(std::cos(theta))};
+}
+
+double worse(const Quality& q) {
+  return std::max(q.nev, q.coverage);
+}
+
+/// What a look-up for wo is worth; without components the lobe's own sampler is all there is, and it is not graded.
+std::optional<double> servedNev(const Lobe& lobe, const DirectionGrid& grid, const FittedGrid& fit, const Vec3& wo) {
+  const CacheLookup found = fit.lookup[static_cast<std::size_t>(grid.nearest(wo))];
+  const CacheRecord& record = fit.records[found.record];
+  if (record.count == 0) return std::nullopt;
+  const Alignment alignment{grid.kind, toDisc(grid.direction(static_cast<int>(record.entry))), found.mirrorX,
+                            found.mirrorY};
+  std::array<Gaussian, kMaxCacheComponents> room;
+  const auto fitted = asGaussians(fit.components).subspan(record.first, record.count);
+  return worse(gradeMixture(lobe, wo, alignMixture(alignment, fitted, wo, room), kGradeSamples));
+}
+
+double quantile(std::vector<double> values, double share) {
+  std::ranges::sort(values);
+  return values[std::min(values.size() - 1, static_cast<std::size_t>(share * static_cast<double>(values.size())))];
+}
+
+/// NEVs of fits made for the directions themselves, by the best method with as many components as there may be.
+std::vector<double> ownNevs(const Lobe& lobe, const CompileOptions& options) {
+  FitSettings settings = options.settings;
+  settings.method = kMethodCeres;
+  std::vector<double> nevs;
+  for (int i = 0; i < kDirections; ++i) {
+    const Vec3 wo = queryDirection(i);
+    nevs.push_back(worse(gradeMixture(lobe, wo, fitLobe(lobe, wo, settings).mixture, kGradeSamples)));
+  }
+  return nevs;
+}
+
+nlohmann::ordered_json measure(const LobeUse& use, const std::string& way, const std::vector<double>& own) {
+  const CompileJob job = planCompile({use}, optionsOf(way)).front();
+  const auto start = std::chrono::steady_clock::now();
+  const FittedGrid fit = fitGrid(*use.lobe, job.grid, job.info.settings);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  std::vector<double> nevs, ratios;
+  for (int i = 0; i < kDirections; ++i) {
+    const std::optional<double> nev = servedNev(*use.lobe, job.grid, fit, queryDirection(i));
+    if (!nev) continue;
+    nevs.push_back(*nev);
+    ratios.push_back((1 + *nev) / (1 + own[static_cast<std::size_t>(i)]));
+  }
+  nlohmann::ordered_json row{{"lobe", use.materials.front()}, {"way", way}, {"seconds", seconds}};
+  row["records"] = fit.records.size();
+  row["components"] = static_cast<double>(fit.components.size()) / static_cast<double>(fit.records.size());
+  row["bytes"] = encodeLobeCache(job.info, fit.records, fit.components, fit.lookup).size();
+  if (nevs.empty()) return row;
+  row["nev_median"] = quantile(nevs, 0.5);
+  row["nev_worst"] = std::ranges::max(nevs);
+  row["ratio_median"] = quantile(ratios, 0.5);
+  row["ratio_p90"] = quantile(ratios, 0.9);
+  return row;
+}
+
+void run(const Options& o) {
+  // One thread: times are then those of the work.
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
+  ReadOptions read = o.read;
+  read.geometry = false;
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  const std::vector<LobeUse> uses = collectLobes(readScene(o.scene, read));
+  Progress progress("fitting", static_cast<double>(uses.size() * o.ways.size()));
+  for (const LobeUse& use : uses) {
+    const std::vector<double> own = ownNevs(*use.lobe, optionsOf("ceres"));
+    for (const std::string& way : o.ways) {
+      rows.push_back(measure(use, way, own));
+      progress.advance();
+    }
+  }
+  fmt::print("{}\n", rows.dump(2));
+}
+
+void declare(CLI::App& app, Options& o) {
+  app.add_option("scene", o.scene, "Scene of which the lobes are fitted")->required();
+  app.add_option("--way", o.ways, "wem, ceres, eq8 or auto:QUALITY; may be repeated")->required();
+  addDefinitions(app, o.read.definitions);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  return lobe::runTool(
+      "lobebench-caches", "Fits the lobes of a scene in several ways, and grades what look-ups meet; prints JSON.",
+      argc, argv, [&](CLI::App& app) { declare(app, options); }, [&] { run(options); });
+}
