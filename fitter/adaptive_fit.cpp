@@ -139,28 +139,26 @@ class AdaptiveFitter {
   FittedGrid result() const {
     FittedGrid result;
     for (const FittedRecord& f : records_) result.append(f, f.record.entry);
-    for (int i = 0; i < grid_.count; ++i) result.lookup.push_back(lookUp(grid_.direction(i)));
+    for (int i = 0; i < grid_.count; ++i) result.lookup.push_back(nearestRecord(grid_.direction(i)));
+    result.quarter = usesQuarter(lobe_, grid_);
     return result;
   }
 
  private:
-  CacheLookup lookUp(const Vec3& wo) const {
-    const bool quarter = usesQuarter(lobe_, grid_);
-    CacheLookup found{0, quarter && wo.x() < 0, quarter && wo.y() < 0};
-    const Vec2 y = toDisc(Vec3(found.mirrorX ? -wo.x() : wo.x(), found.mirrorY ? -wo.y() : wo.y(), wo.z()));
+  std::uint32_t nearestRecord(const Vec3& wo) const {
+    const Vec2 y = toDisc(usesQuarter(lobe_, grid_) ? Mirror::intoQuadrant(wo)(wo) : wo);
     const auto nearest =
         std::ranges::min_element(references_, {}, [&](const Vec2& reference) { return (reference - y).squaredNorm(); });
-    found.record = static_cast<std::uint32_t>(nearest - references_.begin());
-    return found;
+    return static_cast<std::uint32_t>(nearest - references_.begin());
   }
 
   std::optional<FittedRecord> fitWhereNeeded(int entry) const {
     const Vec3 wo = grid_.direction(entry);
     if (records_.empty()) return fitWithFewest(lobe_, wo, settings_);
-    const CacheLookup found = lookUp(wo);
-    const FittedRecord& neighbour = records_[found.record];
+    const std::uint32_t found = nearestRecord(wo);
+    const FittedRecord& neighbour = records_[found];
     Mixture aligned(neighbour.mixture.size());
-    alignMixture({grid_.kind, references_[found.record]}, neighbour.mixture, wo, aligned);
+    alignMixture({grid_.kind, references_[found], {}}, neighbour.mixture, wo, aligned);
     const Quality served = gradeMixture(lobe_, wo, aligned, settings_.samples / kDecisionShare);
     const double moment = 1 + worse(served.nev, served.coverage);
     // A look-up may be worse than a fit for the direction itself by as much as a fit may be worse than the lobe.

@@ -13,9 +13,7 @@
 #include <tbb/global_control.h>
 #include <nlohmann/json.hpp>
 
-#include "fitter/cache_mixture.h"
 #include "fitter/compile.h"
-#include "runtime/mixture/lookup.h"
 #include "scenes/reader.h"
 #include "scenes/tool.h"
 
@@ -57,14 +55,10 @@ double worse(const Quality& q) {
 
 /// What a look-up for wo is worth; without components the lobe's own sampler is all there is, and it is not graded.
 std::optional<double> servedNev(const Lobe& lobe, const DirectionGrid& grid, const FittedGrid& fit, const Vec3& wo) {
-  const CacheLookup found = fit.lookup[static_cast<std::size_t>(grid.nearest(wo))];
-  const CacheRecord& record = fit.records[found.record];
-  if (record.count == 0) return std::nullopt;
-  const Alignment alignment{grid.kind, toDisc(grid.direction(static_cast<int>(record.entry))), found.mirrorX,
-                            found.mirrorY};
   std::array<Gaussian, kMaxCacheComponents> room;
-  const auto fitted = asGaussians(fit.components).subspan(record.first, record.count);
-  return worse(gradeMixture(lobe, wo, alignMixture(alignment, fitted, wo, room), kGradeSamples));
+  const std::span<const Gaussian> mixture = fit.mixtureFor(grid, wo, room);
+  if (mixture.empty()) return std::nullopt;
+  return worse(gradeMixture(lobe, wo, mixture, kGradeSamples));
 }
 
 double quantile(std::vector<double> values, double share) {

@@ -37,6 +37,7 @@ std::vector<std::pair<std::string, std::string>> fieldsOf(const LobeCache& cache
           {"settings.quality", fmt::format("{}", s.quality)},
           {"settings.fixed_grid", s.fixedGrid ? "yes" : "no"},
           {"grid.kind", gridName(grid)},
+          {"grid.quarter", cache.info().quarter ? "yes" : "no"},
           {"grid.count", std::to_string(grid.count)}};
 }
 
@@ -119,7 +120,7 @@ CacheDifference compareCaches(const LobeCache& a, const LobeCache& b) {
     if (fieldsA[i] != fieldsB[i]) d.fields.push_back({fieldsA[i].first, fieldsA[i].second, fieldsB[i].second});
   for (std::size_t i = 0; i < a.records().size(); ++i) {
     const auto entry = static_cast<std::uint32_t>(gridB.nearest(directionOf(a, i)));
-    RecordPair pair{static_cast<int>(i), static_cast<int>(b.lookup(entry).record), false};
+    RecordPair pair{static_cast<int>(i), static_cast<int>(b.lookup(entry)), false};
     pair.same = sameRecord(a, b, pair);
     countQuality(d, recordOf(a, pair.a).nev, recordOf(b, pair.b).nev);
     d.records.push_back(pair);

@@ -117,7 +117,7 @@ FittedRecord fitFromNeighbour(const Lobe& lobe, const DirectionGrid& grid, int e
                               const FittedRecord& fitted, const FitSettings& settings) {
   const Vec3 wo = grid.direction(entry);
   Mixture start(fitted.mixture.size());
-  alignMixture({grid.kind, toDisc(grid.direction(neighbour))}, fitted.mixture, wo, start);
+  alignMixture({grid.kind, toDisc(grid.direction(neighbour)), {}}, fitted.mixture, wo, start);
   FittedRecord record = fitLobe(lobe, wo, settings, start);
   if (record.record.nevCoverage <= kWorseByFactor * fitted.record.nevCoverage + kWorseBy) return record;
   FittedRecord fresh = fitLobe(lobe, wo, settings);
@@ -149,7 +149,7 @@ FittedGrid fitEveryEntry(const Lobe& lobe, const DirectionGrid& grid, const FitS
   FittedGrid result;
   for (std::uint32_t i = 0; i < fitted.size(); ++i) {
     result.append(fitted[i], i);
-    result.lookup.push_back({i});
+    result.lookup.push_back(i);
   }
   return result;
 }
@@ -219,7 +219,9 @@ int workOf(const CompileJob& job) {
 void runCompile(const CompileJob& job, const std::function<void()>& advance) {
   const FittedGrid fit = fitGrid(*job.use.lobe, job.grid, job.info.settings, advance);
   makeFolder(job.path.parent_path());
-  writeAtomically(job.path, encodeLobeCache(job.info, fit.records, fit.components, fit.lookup));
+  LobeCacheInfo info = job.info;
+  info.quarter = fit.quarter;
+  writeAtomically(job.path, encodeLobeCache(info, fit.records, fit.components, fit.lookup));
 }
 
 }  // namespace lobe

@@ -20,7 +20,6 @@ static_assert(std::is_trivially_copyable_v<CacheComponent> && std::is_standard_l
 static_assert(std::is_trivially_copyable_v<CacheRecord> && std::is_standard_layout_v<CacheRecord>);
 
 constexpr std::uint8_t kLastGridKind = 1;
-constexpr std::uint32_t kMirrorX = 1u << 30, kMirrorY = 1u << 31;
 constexpr double kWeightTolerance = 1e-4;
 // Single precision loses the determinant of anything flatter.
 constexpr double kMinRelativeDeterminant = 1e-7;
@@ -81,10 +80,16 @@ LobeCacheInfo readInfo(const fb::LobeCache& cache) {
   info.key = cache.key()->str();
   info.summary = cache.summary()->str();
   info.modelRevision = cache.model_revision();
-  info.settings = {
-      s.method() ? s.method()->str() : "", s.components(), s.samples(), s.reduction(), s.revision(), s.quality(), s.fixed_grid()};
+  info.settings = {s.method() ? s.method()->str() : "",
+                   s.components(),
+                   s.samples(),
+                   s.reduction(),
+                   s.revision(),
+                   s.quality(),
+                   s.fixed_grid()};
   info.gridKind = cache.grid_kind();
   info.gridCount = cache.grid_count();
+  info.quarter = cache.quarter();
   return info;
 }
 
@@ -115,12 +120,7 @@ LobeCache::LobeCache(MappedFile file, const std::filesystem::path& path) : file_
     if (records_[i].entry >= info_.gridCount) refuse(name, fmt::format("record {}: direction out of range", i));
   }
   for (std::uint32_t i = 0; i < lookup_.size(); ++i)
-    if (lookup(i).record >= records_.size()) refuse(name, fmt::format("look-up {}: record out of range", i));
-}
-
-CacheLookup LobeCache::lookup(std::uint32_t entry) const {
-  const std::uint32_t bits = lookup_[entry];
-  return {bits & ~(kMirrorX | kMirrorY), (bits & kMirrorX) != 0, (bits & kMirrorY) != 0};
+    if (lookup_[i] >= records_.size()) refuse(name, fmt::format("look-up {}: record out of range", i));
 }
 
 LobeCache LobeCache::open(const std::filesystem::path& path) {
@@ -133,7 +133,7 @@ std::string lobeFileName(const std::string& model, const std::string& key) {
 
 std::vector<std::byte> encodeLobeCache(const LobeCacheInfo& info, std::span<const CacheRecord> records,
                                        std::span<const CacheComponent> components,
-                                       std::span<const CacheLookup> lookup) {
+                                       std::span<const std::uint32_t> lookup) {
   flatbuffers::FlatBufferBuilder builder(1024 + records.size_bytes() + components.size_bytes());
   const FitSettings& s = info.settings;
   const auto settings = fb::CreateFitSettings(builder, builder.CreateString(s.method), s.components, s.samples,
@@ -147,12 +147,10 @@ std::vector<std::byte> encodeLobeCache(const LobeCacheInfo& info, std::span<cons
       builder.CreateVectorOfStructs(reinterpret_cast<const fb::Record*>(records.data()), records.size());
   const auto componentVector =
       builder.CreateVectorOfStructs(reinterpret_cast<const fb::Component*>(components.data()), components.size());
-  std::vector<std::uint32_t> bits;
-  for (const CacheLookup& l : lookup)
-    bits.push_back(l.record | (l.mirrorX ? kMirrorX : 0) | (l.mirrorY ? kMirrorY : 0));
-  const auto lookupVector = builder.CreateVector(bits);
+  const auto lookupVector = builder.CreateVector(lookup.data(), lookup.size());
   builder.Finish(fb::CreateLobeCache(builder, toolVersion, model, key, info.modelRevision, summary, settings,
-                                     info.gridKind, info.gridCount, lookupVector, recordVector, componentVector));
+                                     info.gridKind, info.gridCount, lookupVector, info.quarter, recordVector,
+                                     componentVector));
   return wrapPayload(kKind, std::as_bytes(std::span(builder.GetBufferPointer(), builder.GetSize())));
 }
 

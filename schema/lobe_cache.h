@@ -21,13 +21,6 @@ struct CacheRecord {
   float integral, albedo, cosineMass, outside, nev, nevCoverage, worstRatio;
 };
 
-/// The record that serves an entry of the grid, to be mirrored in the disc's axes.
-struct CacheLookup {
-  std::uint32_t record;
-  bool mirrorX = false, mirrorY = false;
-  bool operator==(const CacheLookup&) const = default;
-};
-
 struct FitSettings {
   std::string method = "wem";
   std::uint32_t components = 8;
@@ -46,6 +39,7 @@ struct LobeCacheInfo {
   FitSettings settings;
   std::uint8_t gridKind = 0;  ///< GridKind
   std::uint32_t gridCount = 0;
+  bool quarter = false;  ///< of the directions: to be looked up by Mirror::intoQuadrant, and mirrored back
 };
 
 /// An open cache: the mapped file, checked, with its records in place. Immutable; move-only.
@@ -61,8 +55,8 @@ class LobeCache {
   std::span<const CacheComponent> components(const CacheRecord& r) const {
     return components_.subspan(r.first, r.count);
   }
-  /// entry < info().gridCount.
-  CacheLookup lookup(std::uint32_t entry) const;
+  /// The record that serves an entry of the grid, entry < info().gridCount.
+  std::uint32_t lookup(std::uint32_t entry) const { return lookup_[entry]; }
   std::uint64_t hash() const { return header_.hash; }  ///< of the whole content
   /// The file's format version.
   const ContainerHeader& header() const { return header_; }
@@ -87,6 +81,7 @@ std::string lobeFileName(const std::string& model, const std::string& key);
 
 /// The bytes of a cache file; the same input gives the same bytes.
 std::vector<std::byte> encodeLobeCache(const LobeCacheInfo& info, std::span<const CacheRecord> records,
-                                       std::span<const CacheComponent> components, std::span<const CacheLookup> lookup);
+                                       std::span<const CacheComponent> components,
+                                       std::span<const std::uint32_t> lookup);
 
 }  // namespace lobe

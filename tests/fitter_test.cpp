@@ -209,7 +209,7 @@ TEST_CASE("fitter: look-up turns and moves mixtures to the query, and its sign i
     const CacheRecord& r = fit.records[static_cast<std::size_t>(entry)];
     std::array<Gaussian, kMaxCacheComponents> buffer;
     const auto own = asGaussians(fit.components).subspan(r.first, r.count);
-    const std::span<Gaussian> aligned = alignMixture({grid.kind, toDisc(grid.direction(entry))}, own, wo, buffer);
+    const std::span<Gaussian> aligned = alignMixture({grid.kind, toDisc(grid.direction(entry)), {}}, own, wo, buffer);
     REQUIRE(aligned.size() == own.size());
     moved += gradeMixture(*lobe, wo, aligned, 2048).coverage;
     Mixture turned;
@@ -231,7 +231,7 @@ TEST_CASE("fitter: look-up of an anisotropic grid moves without turning") {
   std::array<Gaussian, 1> out;
   const Vec3 wo = direction(40, 70);
   const int entry = grid.nearest(wo);
-  alignMixture({grid.kind, toDisc(grid.direction(entry))}, std::span(&g, 1), wo, out);
+  alignMixture({grid.kind, toDisc(grid.direction(entry)), {}}, std::span(&g, 1), wo, out);
   const Vec2 expected = g.mean() - (toDisc(wo) - toDisc(grid.direction(entry)));
   CHECK((out[0].mean() - expected).norm() < 1e-6f);
   CHECK((out[0].cov.xx == g.cov.xx && out[0].cov.xy == g.cov.xy && out[0].cov.yy == g.cov.yy));
@@ -241,7 +241,7 @@ TEST_CASE("fitter: look-up mirrors what a symmetric lobe has on the other side")
   const Gaussian g{1, -0.3f, 0.1f, {0.01f, 0.002f, 0.04f}};
   std::array<Gaussian, 1> out;
   const Vec3 wo = direction(40, 20);
-  const Alignment alignment{GridKind::fibonacci, Vec2(-toDisc(wo).x(), toDisc(wo).y()), true, false};
+  const Alignment alignment{GridKind::fibonacci, Vec2(-toDisc(wo).x(), toDisc(wo).y()), {true, false}};
   alignMixture(alignment, std::span(&g, 1), wo, out);  // exactly the mirrored direction: no step
   CHECK((out[0].mean() - Vec2(0.3f, 0.1f)).norm() < 1e-6f);
   CHECK((out[0].cov.xx == g.cov.xx && out[0].cov.xy == -g.cov.xy && out[0].cov.yy == g.cov.yy));
@@ -254,6 +254,7 @@ TEST_CASE("fitter: look-up pushes no mean out of the disc") {
   for (int i = 0; i <= 60; ++i) {
     const Vec3 wo = direction(1.5 * i, 200);
     const Vec2 reference = toDisc(grid.direction(grid.nearest(wo)));
-    for (const Gaussian& g : alignMixture({grid.kind, reference}, mixture, wo, out)) CHECK(g.mean().norm() <= 1.00001f);
+    for (const Gaussian& g : alignMixture({grid.kind, reference, {}}, mixture, wo, out))
+      CHECK(g.mean().norm() <= 1.00001f);
   }
 }

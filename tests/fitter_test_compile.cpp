@@ -108,7 +108,7 @@ TEST_CASE("fitter: the summary of a cache is that of its records") {
                                          {1, 1, 2, 1, 1, 0.5f, 0.3f, 0.1f, 0.6f, 5.0f},
                                          {2, 0, 1, 1, 1, 0.5f, 0.2f, 0.2f, 0.5f, 3.0f}};
   writeAtomically(folder / "x.lobe",
-                  encodeLobeCache(info, records, std::vector{c, half, half}, std::vector<CacheLookup>{{0}, {1}, {2}}));
+                  encodeLobeCache(info, records, std::vector{c, half, half}, std::vector<std::uint32_t>{0, 1, 2}));
   const CacheSummary s = summarise(LobeCache::open(folder / "x.lobe"));
   CHECK(s.records == 3);
   CHECK(s.meanComponents == Approx(4.0 / 3));

@@ -61,7 +61,7 @@ LobeCache singleRecord(const fs::path& path, const Lobe& lobe, const Gaussian& g
   record.cosineMass = static_cast<float>(discMass(std::span(&g, 1)).cosine);
   writeAtomically(path, encodeLobeCache(info, std::vector{record},
                                         std::vector{CacheComponent{1, g.meanX, g.meanY, g.cov.xx, g.cov.xy, g.cov.yy}},
-                                        std::vector<CacheLookup>{{0}}));
+                                        std::vector<std::uint32_t>{0}));
   return LobeCache::open(path);
 }
 

@@ -146,7 +146,7 @@ TEST_CASE("loberender: a cache of another version of the lobe is stale") {
     const LobeCache cache = LobeCache::open(path);
     LobeCacheInfo info = cache.info();
     ++info.modelRevision;
-    std::vector<CacheLookup> lookup;
+    std::vector<std::uint32_t> lookup;
     for (std::uint32_t i = 0; i < info.gridCount; ++i) lookup.push_back(cache.lookup(i));
     bytes = encodeLobeCache(info, cache.records(), cache.components(), lookup);
   }

@@ -40,7 +40,7 @@ struct Content {
   LobeCacheInfo info;
   std::vector<CacheRecord> records;
   std::vector<CacheComponent> components;
-  std::vector<CacheLookup> lookup;
+  std::vector<std::uint32_t> lookup;
   std::vector<std::byte> encode() const { return encodeLobeCache(info, records, components, lookup); }
 };
 
@@ -58,7 +58,7 @@ Content smallCache() {
   c.components = {{1.0f, 0.1f, 0.2f, 0.03f, 0.01f, 0.04f},
                   {0.25f, -0.1f, 0.3f, 0.02f, 0.0f, 0.05f},
                   {0.75f, 0.4f, -0.2f, 0.01f, -0.005f, 0.06f}};
-  c.lookup = {{0}, {1, true, false}};
+  c.lookup = {0, 1};
   return c;
 }
 
@@ -228,7 +228,7 @@ TEST_CASE("schema: faults of meaning are refused") {
       {"components out of range", [](Content& c) { c.records[1].first = 2; }},
       {"components out of range", [](Content& c) { c.records[1].first = 0xffffffffu; }},
       {"direction out of range", [](Content& c) { c.records[1].entry = 2; }},
-      {"record out of range", [](Content& c) { c.lookup[0].record = 2; }},
+      {"record out of range", [](Content& c) { c.lookup[0] = 2; }},
       {"number of components", [](Content& c) { c.records[0].count = kMaxCacheComponents + 1; }},
       {"not finite", [&](Content& c) { c.records[0].nev = nan; }},
       {"not finite", [&](Content& c) { c.records[0].worstRatio = nan; }},

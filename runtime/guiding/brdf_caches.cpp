@@ -70,8 +70,9 @@ void BrdfCaches::add(int lobe, const Vec3& wo, const Vec2& turn, float tint, Ref
   };
   // An isotropic lobe can be looked up in the frame wanted; an anisotropic one knows its tangent and is turned after.
   const Vec3 query = isotropic ? turned(wo) : wo;
-  const CacheLookup found = entry.cache.lookup(static_cast<std::uint32_t>(entry.grid.nearest(query)));
-  const CacheRecord& record = entry.cache.records()[found.record];
+  const Mirror mirror = entry.cache.info().quarter ? Mirror::intoQuadrant(query) : Mirror{};
+  const std::uint32_t found = entry.cache.lookup(static_cast<std::uint32_t>(entry.grid.nearest(mirror(query))));
+  const CacheRecord& record = entry.cache.records()[found];
   const std::span<const Gaussian> fitted = asGaussians(entry.cache.components(record));
   const std::span<Gaussian> room = std::span(reflectance.components).subspan(reflectance.count);
   const bool covered = !fitted.empty() && fitted.size() <= room.size();
@@ -80,7 +81,7 @@ void BrdfCaches::add(int lobe, const Vec3& wo, const Vec2& turn, float tint, Ref
 
   // ρ = integral · G / 2, because dω = 2 dA, with G normalised over the disc: records are over the plane.
   const float scale = 0.5f * tint * record.integral / std::max(1.0f - record.outside, 0.1f);
-  const Alignment alignment{entry.grid.kind, entry.references[found.record], found.mirrorX, found.mirrorY};
+  const Alignment alignment{entry.grid.kind, entry.references[found], mirror};
   for (Gaussian& g : alignMixture(alignment, fitted, query, room)) {
     if (!isotropic) g = rotated(g, turn);
     g.weight *= scale;

@@ -21,10 +21,10 @@ float largestStep(const Vec2& mean, const Vec2& step) {
   return std::clamp(t, 0.0f, 1.0f);
 }
 
-Gaussian mirrored(Gaussian g, const Alignment& alignment) {
-  if (alignment.mirrorX) g.meanX = -g.meanX;
-  if (alignment.mirrorY) g.meanY = -g.meanY;
-  if (alignment.mirrorX != alignment.mirrorY) g.cov.xy = -g.cov.xy;
+Gaussian mirrored(Gaussian g, const Mirror& mirror) {
+  if (mirror.x) g.meanX = -g.meanX;
+  if (mirror.y) g.meanY = -g.meanY;
+  if (mirror.x != mirror.y) g.cov.xy = -g.cov.xy;
   return g;
 }
 
@@ -39,9 +39,9 @@ std::span<Gaussian> alignMixture(const Alignment& alignment, std::span<const Gau
     reference = azimuth * reference.x();  // elevations lie on the positive x axis
     for (std::size_t k = 0; k < out.size(); ++k) out[k] = rotated(components[k], azimuth);
   } else {
-    if (alignment.mirrorX) reference.x() = -reference.x();
-    if (alignment.mirrorY) reference.y() = -reference.y();
-    for (std::size_t k = 0; k < out.size(); ++k) out[k] = mirrored(components[k], alignment);
+    if (alignment.mirror.x) reference.x() = -reference.x();
+    if (alignment.mirror.y) reference.y() = -reference.y();
+    for (std::size_t k = 0; k < out.size(); ++k) out[k] = mirrored(components[k], alignment.mirror);
   }
   const Vec2 step = reference - toDisc(wo);
   float t = 1.0f;

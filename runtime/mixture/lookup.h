@@ -8,12 +8,18 @@
 
 namespace lobe {
 
+/// Of a lobe that is symmetric in both tangent axes, the directions with x, y ≥ 0 are enough.
+struct Mirror {
+  bool x = false, y = false;
+  static Mirror intoQuadrant(const Vec3& w) { return {w.x() < 0, w.y() < 0}; }
+  Vec3 operator()(const Vec3& w) const { return {x ? -w.x() : w.x(), y ? -w.y() : w.y(), w.z()}; }
+};
+
 /// How a fitted mixture is to be brought elsewhere.
 struct Alignment {
   GridKind kind;
   Vec2 reference;  ///< the direction it was fitted for, on the disc
-  /// The lobe is symmetric and the direction asked for is on the other side: mixture and reference are mirrored first.
-  bool mirrorX = false, mirrorY = false;
+  Mirror mirror;   ///< applied to mixture and reference first
 };
 
 /// Brings the mixture to wo (unit, z ≥ 0). What was fitted for an elevation is turned to wo's azimuth first. Then all
