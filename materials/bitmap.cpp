@@ -8,8 +8,14 @@
 namespace lobe {
 namespace {
 
-/// The pixel column or row that index i, any number, falls on.
+constexpr int kBlack = -1, kWhite = -2;
+
+/// The pixel column or row that index i, any number, falls on, or what is there instead.
 int wrapIndex(long i, int size, Wrap mode) {
+  if (mode == Wrap::zero || mode == Wrap::one) {
+    if (i >= 0 && i < size) return static_cast<int>(i);
+    return mode == Wrap::zero ? kBlack : kWhite;
+  }
   if (mode == Wrap::clamp) return static_cast<int>(std::clamp(i, 0l, static_cast<long>(size) - 1));
   const long period = mode == Wrap::mirror ? 2l * size : size;
   long r = i % period;
@@ -42,7 +48,7 @@ class BitmapTexture final : public Texture {
       : image_(std::move(image)), options_(options), mean_(meanOf(*image_)) {}
 
   Rgb eval(const Vec2& uv) const override {
-    const Vec2 st = uv.cwiseProduct(options_.uvScale) + options_.uvOffset;
+    const Vec2 st = options_.uvMap(uv);
     const float x = st.x() * static_cast<float>(image_->width), y = st.y() * static_cast<float>(image_->height);
     // Written so that NaN is caught, too.
     if (!(std::abs(x) < kLargestCoordinate && std::abs(y) < kLargestCoordinate)) return mean_;
@@ -50,7 +56,13 @@ class BitmapTexture final : public Texture {
   }
 
   Rgb mean() const override { return mean_; }
-  TextureRange range() const override { return rangeOf(*image_); }
+  TextureRange range() const override {
+    TextureRange range = rangeOf(*image_);
+    const auto uses = [this](Wrap mode) { return options_.wrapU == mode || options_.wrapV == mode; };
+    if (uses(Wrap::zero)) range = {std::min(range.smallest, 0.0f), std::max(range.largest, 0.0f)};
+    if (uses(Wrap::one)) range = {std::min(range.smallest, 1.0f), std::max(range.largest, 1.0f)};
+    return range;
+  }
 
  private:
   Rgb bilinear(float x, float y) const {
@@ -60,9 +72,12 @@ class BitmapTexture final : public Texture {
     return top * (1 - fy) + bottom * fy;
   }
 
-  const Rgb& pixel(float x, float y) const {
-    return image_->at(wrapIndex(static_cast<long>(x), image_->width, options_.wrapU),
-                      wrapIndex(static_cast<long>(y), image_->height, options_.wrapV));
+  Rgb pixel(float x, float y) const {
+    const int column = wrapIndex(static_cast<long>(x), image_->width, options_.wrapU);
+    const int row = wrapIndex(static_cast<long>(y), image_->height, options_.wrapV);
+    if (column < 0) return grey(column == kBlack ? 0.0f : 1.0f);
+    if (row < 0) return grey(row == kBlack ? 0.0f : 1.0f);
+    return image_->at(column, row);
   }
 
   std::shared_ptr<const Image> image_;

@@ -8,11 +8,11 @@ namespace {
 
 class CheckerboardTexture final : public Texture {
  public:
-  CheckerboardTexture(TexturePtr a, TexturePtr b, const Vec2& uvScale, const Vec2& uvOffset)
-      : a_(std::move(a)), b_(std::move(b)), uvScale_(uvScale), uvOffset_(uvOffset) {}
+  CheckerboardTexture(TexturePtr a, TexturePtr b, const UvMap& uvMap)
+      : a_(std::move(a)), b_(std::move(b)), uvMap_(uvMap) {}
 
   Rgb eval(const Vec2& uv) const override {
-    const Vec2 st = uv.cwiseProduct(uvScale_) + uvOffset_;
+    const Vec2 st = uvMap_(uv);
     return (upperHalf(st.x()) == upperHalf(st.y()) ? a_ : b_)->eval(uv);
   }
 
@@ -26,13 +26,13 @@ class CheckerboardTexture final : public Texture {
   static bool upperHalf(float x) { return x - std::floor(x) > 0.5f; }
 
   TexturePtr a_, b_;
-  Vec2 uvScale_, uvOffset_;
+  UvMap uvMap_;
 };
 
 }  // namespace
 
-TexturePtr makeCheckerboard(TexturePtr a, TexturePtr b, Vec2 uvScale, Vec2 uvOffset) {
-  return std::make_shared<CheckerboardTexture>(std::move(a), std::move(b), uvScale, uvOffset);
+TexturePtr makeCheckerboard(TexturePtr a, TexturePtr b, const UvMap& uvMap) {
+  return std::make_shared<CheckerboardTexture>(std::move(a), std::move(b), uvMap);
 }
 
 }  // namespace lobe

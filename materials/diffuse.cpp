@@ -44,7 +44,7 @@ class Diffuse final : public Bsdf {
 
 BsdfPtr makeDiffuse(const Parameters& parameters) {
   // The second name is that of Mitsuba 0.4 and before.
-  const char* name = parameters.has("reflectance") ? "reflectance" : "diffuse_reflectance";
+  const char* name = parameters.has("diffuse_reflectance") ? "diffuse_reflectance" : "reflectance";
   return std::make_shared<Diffuse>(parameters.texture(name, grey(0.5f)));
 }
 

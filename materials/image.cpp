@@ -225,7 +225,8 @@ Image readOther(const std::filesystem::path& path, const Encoding& encoding) {
   Size size;
   int channels = 0;
   if (!stbi_info_from_memory(data, length, &size.width, &size.height, &channels))
-    fail(path, fmt::format("not an image that can be read ({})", stbi_failure_reason()));
+    fail(path, fmt::format("not an image that can be read ({}); known are PNG, JPEG, BMP, TGA, HDR and EXR",
+                           stbi_failure_reason()));
   checkSize(path, size.width, size.height);
   if (stbi_is_hdr_from_memory(data, length)) return readHdr(path, bytes, size);
   if (stbi_is_16_bit_from_memory(data, length)) {

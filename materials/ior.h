@@ -19,9 +19,9 @@ struct ComplexIor {
   Rgb k;
 };
 
-/// material (default Cu, as in Mitsuba 0.6; "none" is a perfect mirror), eta, k and ext_eta (default air), which both are divided by.
-/// Negative components of eta and k become zero, with a note. ParameterError: an unknown name, a number that is not
-/// finite, or an ext_eta that is not positive.
+/// material (default Cu, as in Mitsuba 0.6; "none" is a perfect mirror; "_palik" after a name is passed over), eta, k
+/// and ext_eta (default air), which both are divided by. Negative components of eta and k become zero, with a note.
+/// ParameterError: an unknown name, a number that is not finite, or an ext_eta that is not positive.
 ComplexIor readConductor(const Parameters& parameters);
 
 }  // namespace lobe

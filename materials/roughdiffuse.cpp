@@ -181,7 +181,7 @@ class RoughDiffuse final : public Bsdf {
 }  // namespace
 
 BsdfPtr makeRoughDiffuse(const Parameters& parameters) {
-  const char* name = parameters.has("reflectance") ? "reflectance" : "diffuse_reflectance";
+  const char* name = parameters.has("diffuse_reflectance") ? "diffuse_reflectance" : "reflectance";
   return std::make_shared<RoughDiffuse>(parameters.texture(name, grey(0.5f)), parameters.texture("alpha", grey(0.2f)),
                                         parameters.flag("use_fast_approx", false));
 }

@@ -1,6 +1,7 @@
 #include "materials/roughness.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -13,16 +14,21 @@ namespace {
 constexpr double kSmallestAlpha = 1e-4;
 
 Microfacet::Kind readKind(const Parameters& parameters) {
-  const std::string name = parameters.text("distribution", "beckmann");
-  if (name == "beckmann") return Microfacet::Kind::beckmann;
+  std::string name = parameters.text("distribution", "beckmann");
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (name == "phong" || name == "as")
+    parameters.note(fmt::format("distribution {} is taken for Beckmann's of the same alpha", name));
+  if (name == "phong" || name == "as" || name == "beckmann") return Microfacet::Kind::beckmann;
   if (name == "ggx") return Microfacet::Kind::ggx;
-  throw ParameterError("distribution", fmt::format("unknown distribution \"{}\"; known are beckmann, ggx", name));
+  throw ParameterError("distribution",
+                       fmt::format("unknown distribution \"{}\"; known are beckmann, ggx, phong, as", name));
 }
 
 double readAlpha(const Parameters& parameters, std::string_view name) {
   const double alpha = parameters.number(name, 0.1);
-  if (!(alpha > 0.0 && alpha <= 10.0))
-    throw ParameterError(std::string(name), fmt::format("{} must be in (0, 10], not {}", name, alpha));
+  if (!(alpha >= 0.0 && alpha <= 10.0))
+    throw ParameterError(std::string(name), fmt::format("{} must be in [0, 10], not {}", name, alpha));
+  if (alpha < kSmallestAlpha) parameters.note(fmt::format("{} {} is taken for {}", name, alpha, kSmallestAlpha));
   return std::max(alpha, kSmallestAlpha);
 }
 
@@ -57,9 +63,9 @@ Roughness Roughness::read(const Parameters& parameters) {
   const bool u = parameters.has("alpha_u");
   const bool v = parameters.has("alpha_v");
   if ((u || v) && parameters.has("alpha")) throw ParameterError("alpha", "give either alpha, or alpha_u and alpha_v");
-  if (u != v) throw ParameterError(u ? "alpha_u" : "alpha_v", "alpha_u and alpha_v must be given together");
-  const Alpha alphaU = readAlphaOrTexture(parameters, u ? "alpha_u" : "alpha");
-  const Alpha alphaV = u ? readAlphaOrTexture(parameters, "alpha_v") : alphaU;
+  if (u != v) parameters.note(fmt::format("there is no {}: 0.1", u ? "alpha_v" : "alpha_u"));
+  const Alpha alphaU = readAlphaOrTexture(parameters, u || v ? "alpha_u" : "alpha");
+  const Alpha alphaV = u || v ? readAlphaOrTexture(parameters, "alpha_v") : alphaU;
   if (alphaU.texture || alphaV.texture) return {kind, asTexture(alphaU), asTexture(alphaV)};
   return Roughness(Microfacet(kind, alphaU.number, alphaV.number));
 }

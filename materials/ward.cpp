@@ -100,10 +100,12 @@ Variant readVariant(const Parameters& parameters) {
 }
 
 double readAlpha(const Parameters& parameters, std::string_view name) {
-  const double alpha = parameters.number(name, 0.1);
-  if (!(alpha > 0.0 && alpha <= 10.0))
-    throw ParameterError(std::string(name), fmt::format("{} must be in (0, 10], not {}", name, alpha));
-  return std::max(alpha, 1e-4);
+  constexpr double kSmallest = 1e-4;
+  const double alpha = parameters.number(name, parameters.number("alpha", 0.1));
+  if (!(alpha >= 0.0 && alpha <= 10.0))
+    throw ParameterError(std::string(name), fmt::format("{} must be in [0, 10], not {}", name, alpha));
+  if (alpha < kSmallest) parameters.note(fmt::format("{} {} is taken for {}", name, alpha, kSmallest));
+  return std::max(alpha, kSmallest);
 }
 
 }  // namespace

@@ -6,18 +6,13 @@
 #include <numbers>
 #include <span>
 
+#include "scenes/spectra.h"
+
 namespace lobe {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kCandela = 1.0 / (683.0 * 106.856980);  // from cd/m² to W/(m² sr nm)
-
-Rgb fromXyz(double x, double y, double z) {
-  const Rgb rgb(static_cast<float>(3.240479 * x - 1.537150 * y - 0.498535 * z),
-                static_cast<float>(-0.969256 * x + 1.875991 * y + 0.041556 * z),
-                static_cast<float>(0.055648 * x - 0.204043 * y + 1.057311 * z));
-  return rgb.max(0.0f);
-}
 
 double zenithLuminanceOf(double turbidity, double sunAngle) {
   const double chi = (4.0 / 9.0 - turbidity / 120.0) * (std::numbers::pi - 2.0 * sunAngle);
@@ -92,18 +87,6 @@ double transmittance(double turbidity, double airMass, double wavelength) {
   return std::exp(-depth);
 }
 
-double bell(double wavelength, double peak, double below, double above) {
-  const double t = (wavelength - peak) / (wavelength < peak ? below : above);
-  return std::exp(-0.5 * t * t);
-}
-/// CIE 1931 x̄, ȳ, z̄: the multi-lobe fit of Wyman, Sloan, Shirley 2013 (JCGT 2(2)).
-Eigen::Vector3d colourMatching(double nm) {
-  return {
-      1.056 * bell(nm, 599.8, 37.9, 31.0) + 0.362 * bell(nm, 442.0, 16.0, 26.7) - 0.065 * bell(nm, 501.1, 20.4, 26.2),
-      0.821 * bell(nm, 568.8, 46.9, 40.5) + 0.286 * bell(nm, 530.9, 16.3, 31.1),
-      1.217 * bell(nm, 437.0, 11.8, 36.0) + 0.681 * bell(nm, 459.0, 26.0, 13.8)};
-}
-
 }  // namespace
 
 double PreethamSky::Perez::operator()(double cosine, double sunAngle, double sunCosine) const {
@@ -137,7 +120,7 @@ Rgb PreethamSky::radiance(const Eigen::Vector3d& direction) const {
   const double sunAngle = std::acos(sunCosine);
   const auto value = [&](const Channel& c) { return c.scale * c.perez(cosine, sunAngle, sunCosine); };
   const double luminance = value(luminance_) * kCandela, x = value(x_), y = value(y_);
-  return fromXyz(luminance * x / y, luminance, luminance * (1 - x - y) / y);
+  return rgbOfXyz({luminance * x / y, luminance, luminance * (1 - x - y) / y});
 }
 
 Rgb sunRadiance(double turbidity, double zenithAngle) {
@@ -152,7 +135,7 @@ Rgb sunRadiance(double turbidity, double zenithAngle) {
     if (nm >= kSunFirst && nm <= kSunLast) xyz += response * (sunOutside(nm) * transmittance(turbidity, airMass, nm));
   }
   xyz /= white;
-  return fromXyz(xyz.x(), xyz.y(), xyz.z());
+  return rgbOfXyz(xyz);
 }
 
 double sunRadius() {

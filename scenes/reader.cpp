@@ -1,16 +1,23 @@
 #include "scenes/reader.h"
 
+#include <algorithm>
+#include <array>
+
 #include <fmt/format.h>
 
 #include "scenes/reader_emitters.h"
 #include "scenes/reader_parameters.h"
 #include "scenes/reader_sensor.h"
 #include "scenes/reader_shapes.h"
+#include "scenes/values.h"
 
 namespace lobe {
 namespace {
 
-constexpr std::string_view kKnown = "default, integrator, sensor, bsdf, texture, shape, emitter, medium";
+constexpr std::string_view kKnown =
+    "alias, bsdf, default, emitter, film, include, integrator, medium, path, rfilter, sampler, sensor, shape, texture";
+/// Nothing to read where they stand: SceneFile has seen to them, or something may refer to them.
+constexpr std::array<std::string_view, 6> kElsewhere = {"alias", "default", "film", "path", "rfilter", "sampler"};
 
 class SceneReader {
  public:
@@ -45,7 +52,7 @@ class SceneReader {
       readIntegrator(context_, node);
     else if (tag == "medium")
       noteMedium(context_);
-    else if (tag != "default")
+    else if (std::ranges::find(kElsewhere, tag) == kElsewhere.end())
       reject(node);
   }
 
@@ -58,7 +65,8 @@ class SceneReader {
   void reject(pugi::xml_node node) {
     rejectText(context_, node);
     context_.unsupported(node, fmt::format("<{}> in scene", node.name()),
-                         fmt::format("unknown element <{}>; known are {}", node.name(), kKnown), "it is left out");
+                         fmt::format("unknown element <{}>; {}", node.name(), knownAre(node.name(), kKnown)),
+                         "it is left out");
   }
 
   ReadContext& context_;

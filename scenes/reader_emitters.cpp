@@ -10,12 +10,14 @@
 
 #include "scenes/emission.h"
 #include "scenes/reader_parameters.h"
+#include "scenes/values.h"
 
 namespace lobe {
 namespace {
 
 Environment makeConstant(const Parameters& parameters) {
-  return {Image(1, 1, emission(parameters, "radiance", grey(1.0f)))};
+  const auto scale = static_cast<float>(emissionScale(parameters, "scale", 1.0));
+  return {Image(1, 1, emission(parameters, "radiance", grey(1.0f)) * scale)};
 }
 
 std::optional<Environment> makeFromImage(ReadContext& context, TextureReader& textures, pugi::xml_node node,
@@ -27,8 +29,10 @@ std::optional<Environment> makeFromImage(ReadContext& context, TextureReader& te
   if (!context.options.geometry) return std::nullopt;
   const std::shared_ptr<const Image> image = textures.images().get(context, node, parameters, "it is left out");
   if (!image) return std::nullopt;
-  environment.radiance = *image;
+  environment.radiance = *withoutFaults(context, node, parameters, image, Sign::positive);
   for (Rgb& pixel : environment.radiance.pixels) pixel *= scale;
+  if (std::ranges::any_of(environment.radiance.pixels, [](const Rgb& p) { return !(p <= kLargestEmission).all(); }))
+    throw ParameterError("filename", fmt::format("the image has pixels over {:g}", kLargestEmission));
   return environment;
 }
 
@@ -99,10 +103,14 @@ Parameters readEmitterParameters(ReadContext& context, pugi::xml_node node, cons
 
 void EmitterReader::add(pugi::xml_node node) {
   const std::string type = typeOf(context_, node);
-  if (type == "area") context_.file.fail(node, "an area emitter must stand inside a shape");
+  if (type == "area") {
+    if (node.attribute("id")) return;  // for shapes to refer to
+    context_.file.fail(node, "an area emitter must stand inside a shape, or have an id for shapes to refer to");
+  }
   if (std::ranges::find(kTypes, type) == kTypes.end()) {
     context_.unsupported(node, "emitter " + type,
-                         fmt::format("unknown emitter type \"{}\"; known are {}", type, fmt::join(kTypes, ", ")),
+                         fmt::format("unknown emitter type \"{}\"; {}", type,
+                                     knownAre(type, fmt::format("{}", fmt::join(kTypes, ", ")))),
                          "it is left out");
     return;
   }

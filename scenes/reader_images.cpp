@@ -1,5 +1,6 @@
 #include "scenes/reader_images.h"
 
+#include <algorithm>
 #include <exception>
 
 #include <fmt/format.h>
@@ -50,9 +51,10 @@ void collect(const ReadContext& context, pugi::xml_node node, bool linear, std::
 Encoding encodingOf(const Parameters& parameters) {
   const bool raw = parameters.flag("raw", false);
   const double gamma = parameters.number("gamma", -1.0);
-  if (gamma != -1.0 && !(gamma > 0.0)) throw ParameterError("gamma", "gamma must be positive, or -1 for sRGB");
+  if (gamma != -1.0 && !(gamma >= 0.0))
+    throw ParameterError("gamma", "gamma must be positive, or -1 for sRGB, or 0 for what the file has");
   if (raw || gamma == 1.0) return {Encoding::Kind::linear, 1.0f};
-  if (gamma == -1.0) return {Encoding::Kind::srgb, 1.0f};
+  if (gamma == -1.0 || gamma == 0.0) return {Encoding::Kind::srgb, 1.0f};
   return {Encoding::Kind::gamma, static_cast<float>(gamma)};
 }
 
@@ -60,6 +62,19 @@ Encoding encodingOf(const Parameters& parameters) {
 
 ImageRequest imageRequest(const ReadContext& context, const Parameters& parameters) {
   return {context.file.resolve(requiredText(parameters, "filename")), encodingOf(parameters)};
+}
+
+std::shared_ptr<const Image> withoutFaults(ReadContext& context, pugi::xml_node node, const Parameters& parameters,
+                                           std::shared_ptr<const Image> image, Sign sign) {
+  const auto isFaulty = [sign](const Rgb& p) { return !p.allFinite() || (sign == Sign::positive && (p < 0.0f).any()); };
+  const auto count = std::ranges::count_if(image->pixels, isFaulty);
+  if (count == 0) return image;
+  context.note(fmt::format("{}: {}: {} of {} pixels are {}not finite, and count as black", describe(node),
+                           imageRequest(context, parameters).path.string(), count, image->pixels.size(),
+                           sign == Sign::positive ? "negative or " : ""));
+  auto sound = std::make_shared<Image>(*image);
+  std::ranges::replace_if(sound->pixels, isFaulty, Rgb::Zero());
+  return sound;
 }
 
 ImageStore::ImageStore(const ReadContext& context) {

@@ -23,6 +23,13 @@ struct ImageRequest {
 /// From the parameters filename, raw and gamma (1 is linear, −1 sRGB) of a bitmap or environment map.
 ImageRequest imageRequest(const ReadContext& context, const Parameters& parameters);
 
+/// What an image's numbers may be.
+enum class Sign { positive, any };
+
+/// The image with black for pixels that are not finite or not of this sign, and a note when there are any.
+std::shared_ptr<const Image> withoutFaults(ReadContext& context, pugi::xml_node node, const Parameters& parameters,
+                                           std::shared_ptr<const Image> image, Sign sign);
+
 class ImageStore {
  public:
   /// Reads every image the file's bitmaps (and environment maps, where geometry is wanted) name, in parallel. Faults

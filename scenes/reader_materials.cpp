@@ -6,6 +6,7 @@
 
 #include "materials/registry.h"
 #include "scenes/reader_parameters.h"
+#include "scenes/values.h"
 
 namespace lobe {
 namespace {
@@ -46,13 +47,16 @@ BsdfPtr MaterialReader::make(pugi::xml_node node) {
   const std::string type = typeOf(context_, node);
   const std::vector<std::string> known = knownBsdfs();
   if (std::ranges::find(known, type) == known.end()) {
-    context_.unsupported(node, "bsdf " + type,
-                         fmt::format("unknown bsdf type \"{}\"; known are {}", type, fmt::join(known, ", ")),
-                         "diffuse 0.5 is used");
+    context_.unsupported(
+        node, "bsdf " + type,
+        fmt::format("unknown bsdf type \"{}\"; {}", type, knownAre(type, fmt::format("{}", fmt::join(known, ", ")))),
+        "diffuse 0.5 is used");
     return makeDiffuseOf(0.5f);
   }
-  // Directions are no colours.
-  const Encoded encoded = type == "normalmap" ? Encoded::linear : Encoded::asGiven;
+  // Directions are no colours, and neither are heights.
+  const Encoded encoded = type == "normalmap" ? Encoded::linear
+                          : type == "bumpmap" ? Encoded::asGivenSigned
+                                              : Encoded::asGiven;
   const auto onChild = [&](pugi::xml_node child, const std::string& name, Parameters& parameters) {
     if (elementName(child) != "bsdf") return textures_.take(child, name, parameters, encoded);
     parameters.addChild(read(child));

@@ -1,12 +1,17 @@
 #include "scenes/reader_parameters.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <Eigen/LU>
 
+#include "scenes/mesh_file.h"
+#include "scenes/spectra.h"
 #include "scenes/transforms.h"
 #include "scenes/values.h"
 
@@ -14,10 +19,34 @@ namespace lobe {
 namespace {
 
 constexpr std::string_view kValueElements =
-    "float, integer, boolean, string, rgb, srgb, spectrum, point, vector, transform";
+    "float, integer, boolean, string, rgb, srgb, xyz, spectrum, blackbody, point, vector, transform";
+
+constexpr std::array<std::string_view, 6> kColours = {"rgb", "srgb", "color", "xyz", "spectrum", "blackbody"};
+
+/// What Mitsuba has and we need not: how it stores or filters things, and what belongs to other ways to render.
+constexpr std::pair<std::string_view, std::string_view> kWithoutEffect[] = {
+    {"texture \"bitmap\"", "accel, cache, format, max_anisotropy"},
+    {"emitter \"constant\"", "to_world"},
+    {"emitter \"envmap\"", "cache, mis_compensation"},
+    {"emitter \"sky\"", "extend"},
+    {"emitter \"sunsky\"", "complex_sun, extend, sun_aperture"},
+    {"bsdf \"normalmap\"", "flip_invalid_normals, use_shadowing_function"},
+    {"sensor \"orthographic\"", "shutter_close, shutter_open"},
+    {"sensor \"perspective\"", "shutter_close, shutter_open"},
+    {"sensor \"thinlens\"", "shutter_close, shutter_open"},
+    {"shape \"obj\"", "load_materials, shape_index"},
+    {"shape \"ply\"", "srgb"},
+};
+
+bool hasNoEffect(const std::string& owner, std::string_view name) {
+  for (const auto& [element, names] : kWithoutEffect)
+    if (element == owner && fmt::format(", {}, ", names).find(fmt::format(", {}, ", name)) != std::string::npos)
+      return true;
+  return false;
+}
 
 std::string text(const ReadContext& context, pugi::xml_node node) {
-  checkAttributes(context, node, {"name", "value"});
+  checkAttributes(context, node, {"name", "value", "intent"});
   const pugi::xml_attribute value = node.attribute("value");
   if (!value) context.file.fail(node, fmt::format("<{}> needs a value", node.name()));
   return value.value();
@@ -32,10 +61,51 @@ T parsed(const ReadContext& context, pugi::xml_node node, std::optional<T> (*par
                     fmt::format("\"{}\" is not {} (parameter \"{}\")", value, wanted, node.attribute("name").value()));
 }
 
+std::optional<Rgb> parseRgb(std::string_view text) {
+  return text.find('#') == std::string_view::npos ? parseColour(text) : parseSrgb(text);
+}
+
+std::optional<Rgb> parseXyz(std::string_view text) {
+  const auto values = parseNumbers(text);
+  if (!values || values->size() != 3) return std::nullopt;
+  return rgbOfXyz(Eigen::Vector3d(values->data()));
+}
+
+std::optional<Rgb> parseSpectrumOrColour(std::string_view text) {
+  if (const std::optional<SpectrumPoints> points = parseSpectrum(text)) return rgbOfSpectrum(*points);
+  return parseColour(text);
+}
+
+Rgb readSpectrumFile(const ReadContext& context, pugi::xml_node node) {
+  const std::filesystem::path path = context.file.resolve(node.attribute("filename").value());
+  try {
+    if (const std::optional<SpectrumPoints> points = parseSpectrumFile(readBytes(path))) return rgbOfSpectrum(*points);
+  } catch (const std::runtime_error& error) {
+    context.file.fail(node, fmt::format("<spectrum>: {}: {}", path.string(), error.what()));
+  }
+  context.file.fail(
+      node, fmt::format("<spectrum>: {} does not hold lines of a wavelength, rising, and a value", path.string()));
+}
+
+Rgb readBlackbody(const ReadContext& context, pugi::xml_node node) {
+  checkAttributes(context, node, {"name", "temperature", "scale"});
+  std::string_view temperature = node.attribute("temperature").value();
+  if (temperature.ends_with('K') || temperature.ends_with('k')) temperature.remove_suffix(1);
+  const std::optional<double> kelvin = parseNumber(temperature);
+  const std::optional<double> scale = parseNumber(node.attribute("scale").as_string("1"));
+  if (!kelvin || !(*kelvin >= 100 && *kelvin <= 1e6) || !scale)
+    context.file.fail(node, "<blackbody> needs a temperature from 100 to 1e6 such as 5000K, and a number as scale");
+  return rgbOfBlackbody(*kelvin) * static_cast<float>(*scale);
+}
+
 Rgb readColour(const ReadContext& context, pugi::xml_node node, std::string_view tag) {
   if (tag == "srgb") return parsed<Rgb>(context, node, parseSrgb, "one or three numbers or #rrggbb");
-  if (tag == "spectrum") return parsed<Rgb>(context, node, parseColour, "one or three numbers; no other spectra");
-  return parsed<Rgb>(context, node, parseColour, "one or three numbers");
+  if (tag == "xyz") return parsed<Rgb>(context, node, parseXyz, "three numbers");
+  if (tag == "blackbody") return readBlackbody(context, node);
+  if (tag != "spectrum") return parsed<Rgb>(context, node, parseRgb, "one or three numbers or #rrggbb");
+  if (node.attribute("filename")) return readSpectrumFile(context, node);
+  return parsed<Rgb>(context, node, parseSpectrumOrColour,
+                     "one or three numbers, or pairs of wavelength:value, rising");
 }
 
 Rgb readPoint(const ReadContext& context, pugi::xml_node node) {
@@ -50,7 +120,7 @@ std::optional<ParameterValue> readValue(ReadContext& context, pugi::xml_node nod
   if (tag == "integer") return static_cast<double>(parsed<int>(context, node, parseInteger, "an integer"));
   if (tag == "boolean") return parsed<bool>(context, node, parseBoolean, "true or false");
   if (tag == "string") return text(context, node);
-  if (tag == "rgb" || tag == "srgb" || tag == "color" || tag == "spectrum") return readColour(context, node, tag);
+  if (std::ranges::find(kColours, tag) != kColours.end()) return readColour(context, node, tag);
   if (tag == "point" || tag == "vector") return readPoint(context, node);
   if (tag == "transform") return readTransform(context, node);
   return std::nullopt;
@@ -78,10 +148,12 @@ Parameters readParameters(ReadContext& context, pugi::xml_node node, const std::
     const bool isReference = std::string_view(child.name()) == "ref";
     const pugi::xml_node target = isReference ? resolveReference(context, child) : child;
     if (onChild(target, child.attribute("name").value(), parameters)) continue;
-    context.unsupported(child, fmt::format("<{}> in {}", target.name(), describe(node)),
-                        fmt::format("unknown element <{}> in {}; known are {}{}{}", target.name(), describe(node),
-                                    kValueElements, knownChildren.empty() ? "" : ", ", knownChildren),
-                        "it is left out");
+    context.unsupported(
+        child, fmt::format("<{}> in {}", target.name(), describe(node)),
+        fmt::format("unknown element <{}> in {}; {}", target.name(), describe(node),
+                    knownAre(target.name(),
+                             fmt::format("{}{}{}", kValueElements, knownChildren.empty() ? "" : ", ", knownChildren))),
+        "it is left out");
   }
   return parameters;
 }
@@ -98,11 +170,16 @@ void failAt(const ReadContext& context, pugi::xml_node node, const Parameters& p
 }
 
 void checkUnused(ReadContext& context, pugi::xml_node node, const Parameters& parameters) {
-  for (const std::string& name : parameters.unused())
-    context.unsupported(parameters.location(name), fmt::format("{} of {}", name, describe(node)),
-                        fmt::format("unknown parameter \"{}\" of {}; known are {}", name, describe(node),
-                                    fmt::join(parameters.asked(), ", ")),
-                        "it is ignored");
+  const std::string owner = describe(node);
+  for (const std::string& name : parameters.unused()) {
+    if (hasNoEffect(owner, name))
+      context.note(fmt::format("{}: no effect of {}", owner, name));
+    else
+      context.unsupported(parameters.location(name), fmt::format("{} of {}", name, owner),
+                          fmt::format("unknown parameter \"{}\" of {}; {}", name, owner,
+                                      knownAre(name, fmt::format("{}", fmt::join(parameters.asked(), ", ")))),
+                          "it is ignored");
+  }
 }
 
 void noteUnused(ReadContext& context, pugi::xml_node node, const Parameters& parameters) {

@@ -26,7 +26,7 @@ Parameters readParameters(ReadContext& context, pugi::xml_node node);
 [[noreturn]] void failAt(const ReadContext& context, pugi::xml_node node, const Parameters& parameters,
                          const ParameterError& error);
 
-/// Complains about every parameter that nobody asked for.
+/// Complains about every parameter that nobody asked for; notes those which may be there but have no effect here.
 void checkUnused(ReadContext& context, pugi::xml_node node, const Parameters& parameters);
 
 /// Notes in one line what parameters the element has that nobody asked for: they have no effect.

@@ -183,7 +183,8 @@ void readSensor(ReadContext& context, pugi::xml_node node) {
   const auto known = std::ranges::find(kCameras, type);
   if (known == kCameras.end())
     context.unsupported(node, "sensor " + type,
-                        fmt::format("unknown sensor type \"{}\"; known are {}", type, fmt::join(kCameras, ", ")),
+                        fmt::format("unknown sensor type \"{}\"; {}", type,
+                                    knownAre(type, fmt::format("{}", fmt::join(kCameras, ", ")))),
                         "it is taken for perspective");
   const auto kind =
       known == kCameras.end() ? Camera::Kind::perspective : static_cast<Camera::Kind>(known - kCameras.begin());

@@ -11,6 +11,7 @@
 #include "scenes/emission.h"
 #include "scenes/primitives.h"
 #include "scenes/reader_parameters.h"
+#include "scenes/values.h"
 
 namespace lobe {
 namespace {
@@ -89,9 +90,10 @@ void ShapeReader::add(pugi::xml_node node) {
 void ShapeReader::addTo(int group, pugi::xml_node node) {
   const std::string type = typeOf(context_, node);
   if (std::ranges::find(kTypes, type) == kTypes.end()) {
-    context_.unsupported(node, "shape " + type,
-                         fmt::format("unknown shape type \"{}\"; known are {}", type, fmt::join(kTypes, ", ")),
-                         "it is left out");
+    context_.unsupported(
+        node, "shape " + type,
+        fmt::format("unknown shape type \"{}\"; {}", type, knownAre(type, fmt::format("{}", fmt::join(kTypes, ", ")))),
+        "it is left out");
     return;
   }
   if (group != kTop && (type == "instance" || type == "shapegroup"))

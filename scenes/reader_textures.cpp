@@ -33,30 +33,28 @@ class ScaledTexture final : public Texture {
   Rgb scale_;
 };
 
-struct UvMap {
-  Vec2 scale;
-  Vec2 offset;
-};
-
-/// Mitsuba 0.6's four numbers, or Mitsuba 3's transform, of which translations and scales along the axes are taken.
+/// Mitsuba 0.6's four numbers, or Mitsuba 3's transform in the plane.
 UvMap readUvMap(const Parameters& parameters) {
   if (!parameters.has("to_uv")) {
     const auto number = [&](const char* name, double fallback) {
       return static_cast<float>(parameters.number(name, fallback));
     };
-    return {Vec2(number("uscale", 1), number("vscale", 1)), Vec2(number("uoffset", 0), number("voffset", 0))};
+    return {Eigen::Matrix2f(Vec2(number("uscale", 1), number("vscale", 1)).asDiagonal()),
+            Vec2(number("uoffset", 0), number("voffset", 0))};
   }
   const Eigen::Matrix4d m = parameters.transform("to_uv");
-  if (m(0, 1) != 0 || m(1, 0) != 0) throw ParameterError("to_uv", "to_uv may scale and translate, but not rotate");
   // A matrix of 9 numbers has its translation in the third column, where (u, v) has its 1.
-  return {Vec2(m.diagonal().head<2>().cast<float>()), Vec2((m.col(2) + m.col(3)).head<2>().cast<float>())};
+  return {m.topLeftCorner<2, 2>().cast<float>(), (m.col(2) + m.col(3)).head<2>().cast<float>()};
 }
 
 Wrap parseWrap(const std::string& parameter, const std::string& mode) {
   if (mode == "repeat") return Wrap::repeat;
   if (mode == "mirror") return Wrap::mirror;
   if (mode == "clamp") return Wrap::clamp;
-  throw ParameterError(parameter, fmt::format("unknown wrap mode \"{}\"; known are repeat, mirror, clamp", mode));
+  if (mode == "zero") return Wrap::zero;
+  if (mode == "one") return Wrap::one;
+  throw ParameterError(
+      parameter, fmt::format("unknown wrap mode \"{}\"; {}", mode, knownAre(mode, "repeat, mirror, clamp, zero, one")));
 }
 
 bool readNearest(const Parameters& parameters) {
@@ -76,16 +74,26 @@ BitmapOptions readBitmapOptions(const Parameters& parameters) {
   if (parameters.has("wrap_mode_u")) options.wrapU = parseWrap("wrap_mode_u", parameters.text("wrap_mode_u", ""));
   if (parameters.has("wrap_mode_v")) options.wrapV = parseWrap("wrap_mode_v", parameters.text("wrap_mode_v", ""));
   options.nearest = readNearest(parameters);
-  const UvMap map = readUvMap(parameters);
-  options.uvScale = map.scale;
-  options.uvOffset = map.offset;
+  options.uvMap = readUvMap(parameters);
   return options;
 }
 
+/// The image, or a grey one of the channel that the parameters choose.
+std::shared_ptr<const Image> chosenChannel(const Parameters& parameters, std::shared_ptr<const Image> image) {
+  constexpr std::string_view kChannels = "rgb";
+  const std::string channel = parameters.text("channel", "");
+  if (channel.empty()) return image;
+  const std::size_t index = channel.size() == 1 ? kChannels.find(channel) : std::string_view::npos;
+  if (index == std::string_view::npos)
+    throw ParameterError("channel", fmt::format("unknown channel \"{}\"; known are r, g, b", channel));
+  auto chosen = std::make_shared<Image>(*image);
+  for (Rgb& pixel : chosen->pixels) pixel = grey(pixel[static_cast<Eigen::Index>(index)]);
+  return chosen;
+}
+
 TexturePtr makeCheckerboardFrom(const Parameters& parameters) {
-  const UvMap map = readUvMap(parameters);
-  return makeCheckerboard(parameters.texture("color0", grey(0.4f)), parameters.texture("color1", grey(0.2f)), map.scale,
-                          map.offset);
+  return makeCheckerboard(parameters.texture("color0", grey(0.4f)), parameters.texture("color1", grey(0.2f)),
+                          readUvMap(parameters));
 }
 
 TexturePtr makeScaled(const Parameters& parameters) {
@@ -114,9 +122,10 @@ bool TextureReader::take(pugi::xml_node child, const std::string& name, Paramete
 TexturePtr TextureReader::make(pugi::xml_node node, Encoded encoded) {
   const std::string type = typeOf(context_, node);
   if (type != "bitmap" && type != "checkerboard" && type != "scale") {
-    context_.unsupported(node, "texture " + type,
-                         fmt::format("unknown texture type \"{}\"; known are bitmap, checkerboard, scale", type),
-                         "grey is used");
+    context_.unsupported(
+        node, "texture " + type,
+        fmt::format("unknown texture type \"{}\"; {}", type, knownAre(type, "bitmap, checkerboard, scale")),
+        "grey is used");
     return constantTexture(grey(kPlainGrey));
   }
   Parameters parameters = readParameters(
@@ -125,14 +134,17 @@ TexturePtr TextureReader::make(pugi::xml_node node, Encoded encoded) {
   if (type == "bitmap" && encoded == Encoded::linear) parameters.set("raw", true, parameters.location("raw"));
   return makeFrom(context_, node, parameters, [&](const Parameters& p) {
     if (type == "checkerboard") return makeCheckerboardFrom(p);
-    return type == "scale" ? makeScaled(p) : makeFromBitmap(node, p);
+    return type == "scale" ? makeScaled(p) : makeFromBitmap(node, p, encoded);
   });
 }
 
-TexturePtr TextureReader::makeFromBitmap(pugi::xml_node node, const Parameters& parameters) {
+TexturePtr TextureReader::makeFromBitmap(pugi::xml_node node, const Parameters& parameters, Encoded encoded) {
   const BitmapOptions options = readBitmapOptions(parameters);
-  const std::shared_ptr<const Image> image = images_.get(context_, node, parameters, "grey is used");
-  return image ? makeBitmap(image, options) : constantTexture(grey(kPlainGrey));
+  std::shared_ptr<const Image> image = images_.get(context_, node, parameters, "grey is used");
+  if (!image) return constantTexture(grey(kPlainGrey));
+  const Sign sign = encoded == Encoded::asGiven ? Sign::positive : Sign::any;
+  image = withoutFaults(context_, node, parameters, std::move(image), sign);
+  return makeBitmap(chosenChannel(parameters, std::move(image)), options);
 }
 
 }  // namespace lobe

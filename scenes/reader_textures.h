@@ -8,8 +8,9 @@
 
 namespace lobe {
 
-/// Whether a texture's images are encoded as they or the file say, or hold plain numbers whatever is said.
-enum class Encoded { asGiven, linear };
+/// Whether a texture's images are encoded as they or the file say, and hold colours or any numbers, or are plain
+/// numbers of either sign whatever is said.
+enum class Encoded { asGiven, asGivenSigned, linear };
 
 class TextureReader {
  public:
@@ -24,7 +25,7 @@ class TextureReader {
 
  private:
   TexturePtr make(pugi::xml_node node, Encoded encoded);
-  TexturePtr makeFromBitmap(pugi::xml_node node, const Parameters& parameters);
+  TexturePtr makeFromBitmap(pugi::xml_node node, const Parameters& parameters, Encoded encoded);
 
   ReadContext& context_;
   ImageStore images_;

@@ -1,5 +1,7 @@
 #pragma once
-// A scene file as a tree of elements with places: parsed, $names substituted, ids indexed.
+// A scene file as a tree of elements with places: included files put in, parsed, $names substituted, ids indexed.
+//
+// All files are one text to the parser. A location is an offset in that text; where() knows the file it came from.
 
 #include <cstddef>
 #include <filesystem>
@@ -15,9 +17,10 @@ namespace lobe {
 
 class SceneFile {
  public:
-  /// Reads and parses the file and replaces every $name by the definition's value, else by that of the first <default>
-  /// of this name. Throws SceneError: no such file, broken XML, undefined $name, a definition that nothing uses, an id
-  /// given twice.
+  /// Reads and parses the file, puts what is in the <scene> of other files where it says <include>, and replaces every
+  /// $name by the definition's value, else by that of the first <default> of this name. Throws SceneError: no such
+  /// file, broken XML, undefined $name, a definition that nothing uses, an id given twice, a file that includes itself,
+  /// or elements nested too deeply.
   SceneFile(const std::filesystem::path& path, const std::map<std::string, std::string>& definitions);
 
   pugi::xml_node scene() const { return scene_; }
@@ -25,11 +28,12 @@ class SceneFile {
   /// Written for Mitsuba 3 (or 2), by the scene's version; some defaults differ. Without a version it is an older one.
   bool isOfToday() const;
 
-  /// The element with this id; null when there is none.
+  /// The element with this id, or with the one that the id is an <alias> of; null when there is none.
   pugi::xml_node byId(const std::string& id) const;
 
-  /// A file the scene names: relative to the scene's folder.
-  std::filesystem::path resolve(const std::string& name) const { return path_.parent_path() / name; }
+  /// A file the scene names: in a folder that a <path> gives, the latest first, or else relative to the scene's own
+  /// folder, wherever included files are.
+  std::filesystem::path resolve(const std::string& name) const;
 
   /// "FILE:LINE:COLUMN" of the element's '<'; columns count characters from one.
   std::string where(pugi::xml_node node) const { return where(location(node)); }
@@ -41,16 +45,35 @@ class SceneFile {
   [[noreturn]] void fail(std::ptrdiff_t location, std::string_view message) const;
 
  private:
+  struct File {
+    std::filesystem::path path;
+    std::string text;
+    std::size_t parent;  // the file that includes it; of the first, itself
+  };
+  /// From begin on, to where the next segment begins, the text is that of a file from offset on.
+  struct Segment {
+    std::size_t begin, file, offset;
+  };
+
   void parse();
-  void substituteAll();
+  void checkDepth() const;
+  void readDefaults();
+  void readFolders();
+  bool expandInclude();
+  std::size_t addFile(pugi::xml_node include);
+  void splice(std::size_t begin, std::size_t end, std::size_t file);
+  const Segment& segmentAt(std::size_t offset) const;
   void substitute(pugi::xml_node node);
   std::string substituted(const std::string& text, pugi::xml_node node);
   void checkDefinitionsUsed(const std::map<std::string, std::string>& definitions) const;
   std::vector<std::string> names() const;  // of all values
   void indexIds(pugi::xml_node node);
+  void indexAliases();
 
-  std::filesystem::path path_;
+  std::vector<File> files_;
   std::string text_;
+  std::vector<Segment> segments_;  // in order, the first at 0
+  std::vector<std::filesystem::path> folders_;
   pugi::xml_document document_;
   pugi::xml_node scene_;
   std::map<std::string, std::string> values_;

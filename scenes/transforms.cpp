@@ -42,7 +42,7 @@ Eigen::Matrix4d readLookAt(const ReadContext& context, pugi::xml_node node) {
   checkAttributes(context, node, {"origin", "target", "up"});
   const Eigen::Vector3d up = node.attribute("up") ? readTriple(context, node, "up") : Eigen::Vector3d::UnitY();
   const auto m = lookAt(readTriple(context, node, "origin"), readTriple(context, node, "target"), up);
-  if (!m) context.file.fail(node, "<lookat> has its target at its origin, or up along its view");
+  if (!m) context.file.fail(node, "<lookat> has its target at its origin");
   return *m;
 }
 
@@ -56,9 +56,12 @@ Eigen::Matrix4d readMatrix(const ReadContext& context, pugi::xml_node node) {
     m.topLeftCorner<3, 3>() = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>(values->data());
     return m;
   }
-  const Eigen::Matrix4d m = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>(values->data());
-  if (m.row(3) != Eigen::RowVector4d(0, 0, 0, 1))
+  Eigen::Matrix4d m = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>(values->data());
+  const Eigen::RowVector4d affine(0, 0, 0, 1);
+  constexpr double kRounding = 1e-6;
+  if (!((m.row(3) - affine).cwiseAbs().maxCoeff() <= kRounding))
     context.file.fail(node, "the last row of <matrix> is not 0 0 0 1: perspective is not supported here");
+  m.row(3) = affine;
   return m;
 }
 
@@ -95,8 +98,9 @@ Eigen::Matrix4d readTransform(ReadContext& context, pugi::xml_node transform) {
 std::optional<Eigen::Matrix4d> lookAt(const Eigen::Vector3d& origin, const Eigen::Vector3d& target,
                                       const Eigen::Vector3d& up) {
   const Eigen::Vector3d view = (target - origin).normalized();
-  const Eigen::Vector3d left = up.cross(view);
-  if (!(left.norm() > 1e-9 * up.norm())) return std::nullopt;
+  if (!(view.norm() > 0)) return std::nullopt;
+  Eigen::Vector3d left = up.cross(view);
+  if (!(left.norm() > 1e-9 * up.norm())) left = view.unitOrthogonal();
   Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
   m.col(0).head<3>() = left.normalized();
   m.col(1).head<3>() = view.cross(left.normalized());

@@ -14,8 +14,8 @@ namespace lobe {
 /// The product of a <transform>'s steps, the first applied first. Every step is affine. Throws SceneError.
 Eigen::Matrix4d readTransform(ReadContext& context, pugi::xml_node transform);
 
-/// Camera-to-world: +z from origin to target, +y towards up, +x to the left. nullopt when the directions are
-/// degenerate.
+/// Camera-to-world: +z from origin to target, +y towards up, +x to the left. Where up is along the view, any +y will
+/// do. nullopt when the target is the origin.
 std::optional<Eigen::Matrix4d> lookAt(const Eigen::Vector3d& origin, const Eigen::Vector3d& target,
                                       const Eigen::Vector3d& up);
 

@@ -1,9 +1,13 @@
 #include "scenes/values.h"
 
+#include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <numeric>
+
+#include <fmt/format.h>
 
 namespace lobe {
 namespace {
@@ -35,7 +39,42 @@ std::optional<Rgb> parseHexColour(std::string_view digits) {
          255.0f;
 }
 
+/// Levenshtein's: the fewest letters to insert, drop or exchange.
+std::size_t editDistance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0]++;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t exchanged = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({exchanged, row[j] + 1, diagonal + 1});
+    }
+  }
+  return row.back();
+}
+
+/// The nearest of the names; empty when none looks like what is wanted.
+std::string_view nearest(std::string_view wanted, std::string_view names) {
+  std::string_view best;
+  std::size_t least = wanted.size() / 3 + 2;  // to be below
+  while (!names.empty()) {
+    const std::string_view name = names.substr(0, names.find(", "));
+    names.remove_prefix(std::min(name.size() + 2, names.size()));
+    const std::size_t distance = editDistance(wanted, name);
+    if (distance >= std::min(least, name.size())) continue;
+    least = distance;
+    best = name;
+  }
+  return best;
+}
+
 }  // namespace
+
+std::string knownAre(std::string_view wanted, std::string_view names) {
+  const std::string_view guess = nearest(wanted, names);
+  return fmt::format("{}known are {}", guess.empty() ? "" : fmt::format("did you mean {}? ", guess), names);
+}
 
 std::string normalisedName(std::string_view name) {
   std::string result;
@@ -70,8 +109,8 @@ std::optional<int> parseInteger(std::string_view text) {
 
 std::optional<bool> parseBoolean(std::string_view text) {
   text = trimmed(text);
-  if (text == "true") return true;
-  if (text == "false") return false;
+  if (text == "true" || text == "True") return true;
+  if (text == "false" || text == "False") return false;
   return std::nullopt;
 }
 

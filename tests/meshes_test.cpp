@@ -324,6 +324,9 @@ TEST_CASE("materials: bitmaps repeat, mirror or clamp, each axis by itself") {
   requireNear(at(Wrap::clamp, Wrap::clamp, -9, 9), Rgb(0, 1, 0));
   requireNear(at(Wrap::clamp, Wrap::clamp, 9, -9), Rgb(3, 0, 0));
   requireNear(at(Wrap::clamp, Wrap::repeat, 9, -1), Rgb(3, 1, 0));
+  requireNear(at(Wrap::zero, Wrap::one, -1, 0), grey(0));
+  requireNear(at(Wrap::zero, Wrap::one, 2, 2), grey(1));
+  requireNear(at(Wrap::zero, Wrap::one, 2, 1), Rgb(2, 1, 0));
   // Interpolation reaches across the seam only where the image repeats.
   requireNear(makeBitmap(ramp())->eval({0, 0.25f}), Rgb(1.5f, 0, 0));
   BitmapOptions clamped;
@@ -333,11 +336,14 @@ TEST_CASE("materials: bitmaps repeat, mirror or clamp, each axis by itself") {
 
 TEST_CASE("materials: a bitmap's coordinates are scaled, then moved") {
   BitmapOptions options;
-  options.uvScale = {2, -1};
-  options.uvOffset = {0.25f, 1};
+  options.uvMap.linear = Vec2(2, -1).asDiagonal();
+  options.uvMap.offset = {0.25f, 1};
   const TexturePtr texture = makeBitmap(ramp(), options);
   requireNear(texture->eval({0.0625f, 0.25f}), Rgb(1, 1, 0));
   requireNear(texture->eval({0.1875f, 0.75f}), Rgb(2, 0, 0));
+  options.uvMap.linear << 0, 1, 1, 0;
+  options.uvMap.offset = {0, 0};
+  requireNear(makeBitmap(ramp(), options)->eval({0.25f, 0.875f}), Rgb(3, 0, 0));
 }
 
 TEST_CASE("materials: bitmaps bear odd coordinates and refuse empty images") {
@@ -358,7 +364,7 @@ TEST_CASE("materials: checkerboard") {
   requireNear(board->eval({-0.3f, 5.8f}), Rgb(1, 0, 0));
   requireNear(board->eval(centre(2, 0)), Rgb(2, 0, 0));
   requireNear(board->mean(), Rgb(1.25f, 0.25f, 0));
-  const TexturePtr fine = makeCheckerboard(a, b, {2, 2}, {0.5f, 0});
+  const TexturePtr fine = makeCheckerboard(a, b, {2 * Eigen::Matrix2f::Identity(), {0.5f, 0}});
   requireNear(fine->eval({0.05f, 0.3f}), Rgb(1, 0, 0));
   requireNear(fine->eval({0.35f, 0.3f}), b->eval({0.35f, 0.3f}));
 }

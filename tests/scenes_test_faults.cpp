@@ -87,8 +87,8 @@ TEST_CASE("scenes: wrong values are told with their text") {
   checkFault(fault("<boolean name=\"nonlinear\" value=\"yes\"/>"), "3:3", {"\"yes\"", "true or false"});
   checkFault(fault("<rgb name=\"diffuse_reflectance\" value=\"1, 2\"/>"), "3:3", {"\"1, 2\""});
   checkFault(fault("<string name=\"alpha\" value=\"rough\"/>"), "3:3", {"alpha"});
-  checkFault(fault("<string name=\"distribution\" value=\"phong\"/>"), "3:3", {"\"phong\"", "beckmann, ggx"});
-  checkFault(fault("<spectrum name=\"diffuse_reflectance\" value=\"400:1, 700:2\"/>"), "3:3", {"400:1"});
+  checkFault(fault("<string name=\"distribution\" value=\"blinn\"/>"), "3:3", {"\"blinn\"", "beckmann, ggx"});
+  checkFault(fault("<spectrum name=\"diffuse_reflectance\" value=\"400:1, 400:2\"/>"), "3:3", {"400:1"});
   checkFault(faultOf("<shape type=\"sphere\"><float name=\"radius\" value=\"-2\"/></shape>"), "2:22", {"radius", "-2"});
   checkFault(faultOf("<shape type=\"sphere\"><transform name=\"to_world\"><scale x=\"2\"/></transform></shape>"),
              "2:22", {"shape \"sphere\""});
