@@ -73,11 +73,10 @@ TEST_CASE("materials: the registry knows its models and names them to who asks f
 }
 
 TEST_CASE("materials: wrong parameters are refused with what is known") {
-  CHECK_THAT(messageOf("roughconductor", {{"distribution", std::string("phong")}}),
-             Contains("distribution:") && Contains("phong") && Contains("beckmann, ggx"));
-  CHECK_THAT(messageOf("roughconductor", {{"alpha", 0.0}}), Contains("alpha:"));
+  CHECK_THAT(messageOf("roughconductor", {{"distribution", std::string("blinn")}}),
+             Contains("distribution:") && Contains("blinn") && Contains("beckmann, ggx"));
+  CHECK_THAT(messageOf("roughconductor", {{"alpha", -0.1}}), Contains("alpha:"));
   CHECK_THAT(messageOf("roughconductor", {{"alpha", std::nan("")}}), Contains("alpha:"));
-  CHECK_THAT(messageOf("roughconductor", {{"alpha_u", 0.1}}), Contains("together"));
   CHECK_THAT(messageOf("roughconductor", {{"alpha", 0.1}, {"alpha_u", 0.1}, {"alpha_v", 0.1}}), Contains("either"));
   CHECK_THAT(messageOf("roughconductor", {{"material", std::string("Unobtainium")}}), Contains("Au") && Contains("Cu"));
   CHECK_THAT(messageOf("roughconductor", {{"alpha", grey(0.1f)}}), Contains("number"));
