@@ -45,10 +45,10 @@ class Parameters {
   bool flag(std::string_view name, bool fallback) const;
   double number(std::string_view name, double fallback) const;
   std::string text(std::string_view name, std::string fallback) const;
-  Rgb colour(std::string_view name, const Rgb& fallback) const;          ///< from rgb, or a number as grey
+  Rgb colour(std::string_view name, const Rgb& fallback) const;  ///< from rgb, or a number as grey
   /// From texture, rgb or number; ParameterError also where one of the latter is negative or not finite.
   TexturePtr texture(std::string_view name, const Rgb& fallback) const;
-  Eigen::Matrix4d transform(std::string_view name) const;                ///< identity when missing
+  Eigen::Matrix4d transform(std::string_view name) const;  ///< identity when missing
   /// The only texture among the parameters, whatever its name (a nested texture may have none); ParameterError when
   /// there are none or several.
   TexturePtr onlyTexture() const;

@@ -493,6 +493,7 @@ TEST_CASE("scenes: broken OBJ files are refused by name") {
   REQUIRE_THAT(fault("v 0 0 0\n\nv 1 0\n"), Contains("line 3"));
   REQUIRE_THAT(fault(vertices + "f a b c\n"), Contains("line 6") && Contains("\"a\""));
   REQUIRE_THAT(fault(vertices + "f 99999999999999999999 1 2\n"), Contains("line 6") && Contains("999 1 2"));
+  REQUIRE_THAT(fault(vertices + "f 1/99999999999999999999 2/1 3/1\n"), Contains("texture coordinate"));
   REQUIRE_THAT(fault(vertices + "f 1 2 3/1/1/1\n"), Contains("\"3/1/1/1\""));
   REQUIRE_THAT(fault(vertices + "\n\nf 1 2\n"), Contains("line 8") && Contains("three corners"));
   REQUIRE_THAT(fault("v 0 0 1e99\nv 0 1 0\nv 1 0 0\nf 1 2 3\n"), Contains("not a finite number"));
