@@ -28,6 +28,11 @@ const Parameters::Entry* Parameters::find(std::string_view name) const {
 }
 
 bool Parameters::has(std::string_view name) const {
+  asked_.emplace(name);
+  return contains(name);
+}
+
+bool Parameters::contains(std::string_view name) const {
   return entries_.find(name) != entries_.end();
 }
 

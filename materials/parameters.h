@@ -35,7 +35,9 @@ class Parameters {
   void set(const std::string& name, ParameterValue value, std::ptrdiff_t location = 0);
   void addChild(BsdfPtr bsdf) { children_.push_back(std::move(bsdf)); }
 
+  /// For those who know what to do with it: the name counts as asked for. contains is for those who only pass it on.
   bool has(std::string_view name) const;
+  bool contains(std::string_view name) const;
   /// Whether the parameter is there and is text, for what may be given by name or by number.
   bool holdsText(std::string_view name) const;
   /// The same for what may be a number or a texture.

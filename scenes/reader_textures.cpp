@@ -114,7 +114,7 @@ TexturePtr TextureReader::read(pugi::xml_node node, Encoded encoded) {
 bool TextureReader::take(pugi::xml_node child, const std::string& name, Parameters& parameters, Encoded encoded) {
   if (elementName(child) != "texture") return false;
   const std::string key = name.empty() ? "texture" : normalisedName(name);
-  if (parameters.has(key)) context_.file.fail(child, fmt::format("the parameter \"{}\" is given twice", key));
+  if (parameters.contains(key)) context_.file.fail(child, fmt::format("the parameter \"{}\" is given twice", key));
   parameters.set(key, read(child, encoded), SceneFile::location(child));
   return true;
 }

@@ -267,6 +267,8 @@ TEST_CASE("scenes: slips are told with the nearest name") {
              Catch::Contains("did you mean reflectance?"));
   CHECK_THAT(faultOf("<bsdf type=\"diffuse\"><flaot name=\"reflectance\" value=\"1\"/></bsdf>"),
              Catch::Contains("did you mean float?"));
+  CHECK_THAT(faultOf("<bsdf type=\"roughconductor\"><float name=\"alfa_u\" value=\"1\"/></bsdf>"),
+             Catch::Contains("did you mean alpha_u? known are alpha, alpha_u, alpha_v, distribution, eta"));
   CHECK_THAT(faultOf("<bsdf type=\"velvet\"/>"), !Catch::Contains("did you mean"));
 }
 
