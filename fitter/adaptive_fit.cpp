@@ -179,7 +179,7 @@ class AdaptiveFitter {
   }
 
   FittedRecord withoutComponents(int entry) const {
-    FittedRecord fitted;
+    FittedRecord fitted{{}, {}};
     for (const LobeDraw& d : drawLobe(lobe_, grid_.direction(entry), 0, settings_.samples)) {
       fitted.record.integral += static_cast<float>(d.value / d.pdf / settings_.samples);
       fitted.record.albedo += static_cast<float>(d.value * d.wi.z() / d.pdf / settings_.samples);

@@ -120,31 +120,21 @@ class Inflater {
   z_stream stream_{};
 };
 
-template <class Real>
-std::vector<Vec3> readVectors(Inflater& in, std::uint64_t count) {
-  const std::vector<Real> numbers = in.values<Real>(3 * count);
-  std::vector<Vec3> result;
+template <class Real, int size>
+std::vector<Eigen::Vector<float, size>> readVectors(Inflater& in, std::uint64_t count) {
+  const std::vector<Real> numbers = in.values<Real>(size * count);
+  std::vector<Eigen::Vector<float, size>> result;
   result.reserve(count);
-  for (std::size_t i = 0; i < numbers.size(); i += 3)
-    result.push_back(Eigen::Matrix<Real, 3, 1>(numbers[i], numbers[i + 1], numbers[i + 2]).template cast<float>());
-  return result;
-}
-
-template <class Real>
-std::vector<Vec2> readPairs(Inflater& in, std::uint64_t count) {
-  const std::vector<Real> numbers = in.values<Real>(2 * count);
-  std::vector<Vec2> result;
-  result.reserve(count);
-  for (std::size_t i = 0; i < numbers.size(); i += 2)
-    result.push_back(Eigen::Matrix<Real, 2, 1>(numbers[i], numbers[i + 1]).template cast<float>());
+  for (std::size_t i = 0; i < numbers.size(); i += size)
+    result.push_back(Eigen::Map<const Eigen::Vector<Real, size>>(&numbers[i]).template cast<float>());
   return result;
 }
 
 template <class Real>
 void readVertices(Inflater& in, std::uint32_t flags, std::uint64_t count, TriangleMesh& mesh) {
-  mesh.positions = readVectors<Real>(in, count);
-  if (flags & kHasNormals) mesh.normals = readVectors<Real>(in, count);
-  if (flags & kHasTexcoords) mesh.uvs = readPairs<Real>(in, count);
+  mesh.positions = readVectors<Real, 3>(in, count);
+  if (flags & kHasNormals) mesh.normals = readVectors<Real, 3>(in, count);
+  if (flags & kHasTexcoords) mesh.uvs = readVectors<Real, 2>(in, count);
   if (flags & kHasColours) in.values<Real>(3 * count);
   if (flags & kFaceNormals) mesh.normals.clear();
 }
