@@ -26,8 +26,9 @@ void require(bool condition, const char* option, const std::string& range) {
 }
 
 DirectionGrid gridFor(const Lobe& lobe, const CompileOptions& options) {
+  const int directions = options.settings.method == kMethodAuto ? kAutoDirections : kDirections;
   if (lobe.kind() == LobeKind::isotropic) return {GridKind::elevation, options.elevations.value_or(kElevations)};
-  if (lobe.kind() == LobeKind::anisotropic) return {GridKind::fibonacci, options.directions.value_or(kDirections)};
+  if (lobe.kind() == LobeKind::anisotropic) return {GridKind::fibonacci, options.directions.value_or(directions)};
   throw std::runtime_error(fmt::format("lobe {} is constant or a mirror: neither can be fitted", lobe.summary()));
 }
 
