@@ -18,8 +18,8 @@ namespace lobe {
 /// Method auto with the quality that charts of quality against time and size recommend.
 FitSettings defaultFitSettings();
 
-/// The grids where no option says otherwise. With method auto few directions need a record of their own, and of symmetric
-/// lobes only a quarter is looked at, so that the grid of anisotropic lobes may be finer.
+/// The grids where no option says otherwise. With method auto few directions need a record of their own, and of
+/// symmetric lobes only a quarter is looked at, so that the grid of anisotropic lobes may be finer.
 inline constexpr int kElevations = 64, kDirections = 512, kAutoDirections = 2048;
 
 struct CompileOptions {
