@@ -160,7 +160,7 @@ FittedGrid fitEveryEntry(const Lobe& lobe, const DirectionGrid& grid, const FitS
 FitSettings defaultFitSettings() {
   FitSettings settings;
   settings.method = kMethodAuto;
-  settings.quality = 0.02f;
+  settings.quality = 0.03f;
   return settings;
 }
 
