@@ -23,7 +23,7 @@ constexpr double kWorthwhile = 0.25;
 constexpr std::array<std::uint32_t, 5> kSizes{2, 3, 4, 6, 8};
 // Decisions need fewer points than the grades that are stored.
 constexpr std::uint32_t kDecisionShare = 4;
-// A lobe of this standard deviation on the disc is a hundred times narrower than anything that illumination learns.
+// A lobe of this standard deviation on the disc is over ten times narrower than what illumination starts to learn with.
 constexpr double kNarrow = 0.004;
 constexpr std::uint32_t kNarrowRecords = 8;
 
@@ -41,7 +41,7 @@ double widthOf(const Lobe& lobe) {
   Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
   double weight = 0;
   for (const LobeDraw& d : drawLobe(lobe, wo, 0, points)) {
-    // The median would do as well; tails are cut, as a narrow peak with long tails is narrow.
+    // Tails count little: a narrow peak with long tails is narrow.
     const Eigen::Vector2d y = (toDisc(d.wi) + toDisc(wo)).cast<double>();
     const double w = d.value / d.pdf / (1 + y.squaredNorm() / (kNarrow * kNarrow));
     squares += w * y * y.transpose();

@@ -9,13 +9,14 @@
 
 namespace lobe {
 
-/// Fits the lobe so that every direction of the grid is served with an NEV (the worse of both estimates of Quality) of
-/// settings.quality, where settings.components Gaussians can do that, and near the best that they can elsewhere.
+/// Fits the lobe so that every record has an NEV (the worse of both estimates of Quality) of settings.quality, where
+/// settings.components Gaussians can do that, and near the best that they can elsewhere.
 ///
-/// Directions are taken from coarse to fine. One that the record nearest to it serves well enough, brought to it by
-/// alignMixture, gets none of its own. Of a lobe with mirrorSymmetric, a quarter of the directions is looked at. A lobe
-/// so narrow that no mixture could help gets records without components. advance is called for every direction looked
-/// at, from any thread; the result does not depend on the number of threads. Throws std::runtime_error as fitLobe.
+/// Directions are taken from coarse to fine. One that the record nearest to it serves with a second moment at most
+/// 1 + settings.quality times the record's own, brought to it by alignMixture, gets none of its own. Of a lobe with
+/// mirrorSymmetric, a quarter of the directions is looked at. A lobe so narrow that no mixture could help gets records
+/// without components. advance is called for every direction looked at, from any thread; the result does not depend on
+/// the number of threads. Throws std::runtime_error as fitLobe.
 FittedGrid fitAdaptively(const Lobe& lobe, const DirectionGrid& grid, const FitSettings& settings,
                          const std::function<void()>& advance = {});
 
