@@ -1,0 +1,201 @@
+// lobebench-illumination: what passes of training are worth: how likely photons are that were not learnt from, and how
+// well the mixtures fit the light that path tracing finds at places that the camera's paths ask about.
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include <fmt/format.h>
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <nlohmann/json.hpp>
+
+#include "runtime/render/received_light.h"
+#include "runtime/render/training.h"
+#include "scenes/camera.h"
+#include "scenes/reader.h"
+#include "scenes/tool.h"
+
+namespace {
+
+using namespace lobe;
+
+const std::uint64_t kHeldOutSeed =
+    getenv("HS") ? atoi(getenv("HS")) : 1000003;  // of photons, receivers and the light they receive; not of training
+
+struct Options {
+  std::string scene;
+  ReadOptions read;
+  std::vector<int> passes{1, 2, 4, 8, 16};
+  int width = 350;
+  int receivers = 200;
+  int heldOutPhotons = 2000000;
+  int threads = 0;
+  TrainingPlan plan;
+};
+
+/// A training and how long it was.
+struct Trained {
+  int passes;
+  TrainedIllumination illumination;
+};
+
+/// What all trainings are graded on.
+struct Exam {
+  std::vector<Receiver> receivers;
+  std::vector<std::vector<Particle>> particles;  ///< held out, around each receiver
+  std::vector<ReceivedLight> light;              ///< at each receiver
+};
+
+Scene readFor(const Options& o) {
+  Scene scene = readScene(o.scene, o.read);
+  const double aspect = static_cast<double>(scene.camera.height) / scene.camera.width;
+  scene.camera.crop.reset();
+  scene.camera.width = o.width;
+  scene.camera.height = std::max(1, static_cast<int>(std::lround(o.width * aspect)));
+  scene.camera.horizontalFov = horizontalFov(scene.camera, scene.camera.width, scene.camera.height);
+  return scene;
+}
+
+/// Photons of another seed, of the environment where importons ask for them, but guided by nothing that was learnt.
+std::vector<Particle> heldOutParticles(const RenderScene& scene, const RayCamera& camera, const Options& o) {
+  const IlluminationCache nothing;
+  const GuidedSampler sampler(scene.scene, nothing, nullptr);
+  std::optional<EnvironmentGuide> guide;
+  if (scene.lights.environmentProbability() > 0) guide.emplace(scene.lights);
+  const ParticleTracer tracer(scene, camera, sampler, guide ? &*guide : nullptr, kHeldOutSeed);
+  if (guide) {
+    for (const EnvironmentUse& use : tracer.traceImportons(0, 8 * o.plan.importons).uses)
+      guide->learn(use.point, use.wi, use.weight);
+    guide->update();
+  }
+  return tracer.tracePhotons(0, o.heldOutPhotons);
+}
+
+Exam makeExam(const RenderScene& scene, const RayCamera& camera, const Options& o, const IlluminationCache& best) {
+  Exam exam;
+  exam.receivers = receiversOfPaths(scene, camera, o.receivers, kHeldOutSeed);
+  const std::vector<Particle> particles = heldOutParticles(scene, camera, o);
+  const float reach = o.plan.records.unitShare * scene.tracer.bounds().diagonal().norm();
+  const std::size_t count = exam.receivers.size();
+  exam.particles.resize(count);
+  exam.light.assign(count, ReceivedLight({}));
+  // Guided paths: light that was scattered before it came through panes is fireflies to others.
+  const GuidedSampler sampler(scene.scene, best, nullptr);
+  const GuidedIntegrator paths(scene, {}, sampler);
+  oneapi::tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+    const Receiver& receiver = exam.receivers[i];
+    exam.particles[i] =
+        particlesAround(receiver, particles, static_cast<std::size_t>(o.plan.records.neighbours), reach);
+    ReceivedLightOptions options;
+    options.seed = kHeldOutSeed;
+    exam.light[i] = ReceivedLight(scene, paths, receiver, ServedDensity(best, receiver), options, i);
+  });
+  return exam;
+}
+
+/// Of numbers that scatter over magnitudes: the median, nine of ten, and the geometric mean of 1 + NEV less 1, which no
+/// single receiver decides.
+nlohmann::ordered_json summary(std::vector<double> nevs) {
+  if (nevs.empty()) return nullptr;
+  std::ranges::sort(nevs);
+  for (double n : nevs) fmt::print(stderr, "{:.2f} ", n);
+  fmt::print(stderr, "\n");
+}
+double logs = 0;
+for (const double nev : nevs) logs += std::log(std::max(1 + nev, 1e-3));
+const auto quantile = [&](double share) {
+  return nevs[std::min(nevs.size() - 1, static_cast<std::size_t>(share * static_cast<double>(nevs.size())))];
+};
+return {{"median", quantile(0.5)}, {"p90", quantile(0.9)}, {"mean", std::exp(logs / nevs.size()) - 1}};
+}
+
+nlohmann::ordered_json grade(const Exam& exam, const IlluminationCache& cache) {
+  std::vector<double> mixture, defensive;
+  double logs = 0;
+  int withParticles = 0, served = 0;
+  for (std::size_t i = 0; i < exam.receivers.size(); ++i) {
+    const ServedDensity density(cache, exam.receivers[i]);
+    const auto mixturePdf = [&](const Vec3& wi) { return density.mixture(wi); };
+    served += density.record() != nullptr;
+    if (const auto mean = meanLogDensity(exam.particles[i], mixturePdf)) {
+      logs += *mean;
+      ++withParticles;
+    }
+    if (const auto nev = exam.light[i].nev(mixturePdf)) mixture.push_back(*nev);
+    if (const auto nev = exam.light[i].nev([&](const Vec3& wi) { return density.defensive(wi); }))
+      defensive.push_back(*nev);
+  }
+  const auto count = static_cast<double>(exam.receivers.size());
+  return {{"log_likelihood", logs / std::max(1, withParticles)},
+          {"nev", summary(mixture)},
+          {"nev_defensive", summary(defensive)},
+          {"served_share", served / count},
+          {"lit_share", static_cast<double>(mixture.size()) / count},
+          {"share_with_particles", withParticles / count}};
+}
+
+nlohmann::ordered_json row(const Exam& exam, const Trained& trained) {
+  nlohmann::ordered_json json{{"passes", trained.passes}};
+  json.update(grade(exam, trained.illumination.cache));
+  json["seconds"] = trained.illumination.report.seconds;
+  json["particles"] = trained.illumination.report.particles;
+  json["records"] = trained.illumination.cache.records().size();
+  json["record_bytes"] = trained.illumination.cache.bytes();
+  return json;
+}
+
+void run(Options& o) {
+  std::optional<oneapi::tbb::global_control> limit;
+  if (o.threads > 0) limit.emplace(oneapi::tbb::global_control::max_allowed_parallelism, o.threads);
+  std::ranges::sort(o.passes);
+  o.plan.passes = o.passes.front();
+  o.plan.validate();
+  const Scene scene = readFor(o);
+  const RenderScene renderScene(scene);
+  const RayCamera camera(scene.camera, scene.filter);
+  Progress progress("training", static_cast<double>(o.passes.size() + 1));
+  std::vector<Trained> trainings;
+  for (const int passes : o.passes) {
+    // Each from the start: so every row is what a render with that many passes gets.
+    o.plan.passes = passes;
+    trainings.push_back({passes, trainIllumination(renderScene, camera, nullptr, o.plan)});
+    progress.advance();
+  }
+  const Exam exam = makeExam(renderScene, camera, o, trainings.back().illumination.cache);
+  progress.advance();
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  rows.push_back(row(exam, {0, {}}));  // nothing learnt: the cosine
+  for (const Trained& trained : trainings) rows.push_back(row(exam, trained));
+  fmt::print("{}\n", rows.dump(2));
+}
+
+void declare(CLI::App& app, Options& o) {
+  app.add_option("scene", o.scene, "Mitsuba scene file (XML)")->required();
+  app.add_option("--passes", o.passes, "Numbers of passes to grade, separated by commas")
+      ->delimiter(',')
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--width", o.width, "Of the picture, in pixels; its shape stays")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--receivers", o.receivers, "Places where to look")->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--photons", o.plan.photons, "Photons a pass")->capture_default_str();
+  app.add_option("--importons", o.plan.importons, "Importons a pass")->capture_default_str();
+  app.add_option("--components", o.plan.records.components, "Gaussians of a record")->capture_default_str();
+  app.add_option("--seed", o.plan.seed, "Of the training")->capture_default_str();
+  app.add_flag("--lenient", o.read.lenient, "Pass over what the reader does not know");
+  addDefinitions(app, o.read.definitions);
+  addThreads(app, o.threads);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  return lobe::runTool(
+      "lobebench-illumination",
+      "Trains a scene's illumination for several numbers of passes, and grades it; prints JSON.", argc, argv,
+      [&](CLI::App& app) { declare(app, options); }, [&] { run(options); });
+}
