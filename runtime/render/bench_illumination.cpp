@@ -21,8 +21,8 @@ namespace {
 
 using namespace lobe;
 
-const std::uint64_t kHeldOutSeed =
-    getenv("HS") ? atoi(getenv("HS")) : 1000003;  // of photons, receivers and the light they receive; not of training
+// Of photons, receivers and the light they receive; not of training.
+constexpr std::uint64_t kHeldOutSeed = 1000003;
 
 struct Options {
   std::string scene;
@@ -100,15 +100,13 @@ Exam makeExam(const RenderScene& scene, const RayCamera& camera, const Options& 
 nlohmann::ordered_json summary(std::vector<double> nevs) {
   if (nevs.empty()) return nullptr;
   std::ranges::sort(nevs);
-  for (double n : nevs) fmt::print(stderr, "{:.2f} ", n);
-  fmt::print(stderr, "\n");
-}
-double logs = 0;
-for (const double nev : nevs) logs += std::log(std::max(1 + nev, 1e-3));
-const auto quantile = [&](double share) {
-  return nevs[std::min(nevs.size() - 1, static_cast<std::size_t>(share * static_cast<double>(nevs.size())))];
-};
-return {{"median", quantile(0.5)}, {"p90", quantile(0.9)}, {"mean", std::exp(logs / nevs.size()) - 1}};
+  double logs = 0;
+  for (const double nev : nevs) logs += std::log(std::max(1 + nev, 1e-3));
+  const auto count = static_cast<double>(nevs.size());
+  const auto quantile = [&](double share) {
+    return nevs[std::min(nevs.size() - 1, static_cast<std::size_t>(share * count))];
+  };
+  return {{"median", quantile(0.5)}, {"p90", quantile(0.9)}, {"mean", std::exp(logs / count) - 1}};
 }
 
 nlohmann::ordered_json grade(const Exam& exam, const IlluminationCache& cache) {
