@@ -108,11 +108,15 @@ TEST_CASE("guiding: the look-up works far from the origin") {
   CHECK(cache.find({1e5f + 20, -1e5f, 3e4f}, -Vec3::UnitZ()) == nullptr);
 }
 
+void learn(IlluminationTrainer& trainer, std::span<const Particle> particles, std::span<const RecordRequest> requests) {
+  trainer.learn(std::array{particles}, requests);
+}
+
 TEST_CASE("guiding: training finds the light and the background") {
   const Vec3 towards = Vec3(0.6f, 0.0f, 0.8f);
   IlluminationTrainer trainer({}, 10.0f);
   for (int pass = 0; pass < 6; ++pass)
-    trainer.learn(planeParticles(20000, towards, 0.3f, 100 + pass), planeRequests(500));
+    learn(trainer, planeParticles(20000, towards, 0.3f, 100 + pass), planeRequests(500));
   REQUIRE(!trainer.cache().records().empty());
   CHECK(trainer.undersampledShare() == 0);
   const IlluminationRecord* record = trainer.cache().find({0.5f, 0.5f, 0}, Vec3::UnitZ());
@@ -127,15 +131,55 @@ TEST_CASE("guiding: training finds the light and the background") {
 
 TEST_CASE("guiding: training places no record where no particle is, and none twice") {
   IlluminationTrainer trainer({}, 10.0f);
-  trainer.learn({}, planeRequests(10));
+  learn(trainer, {}, planeRequests(10));
   CHECK(trainer.cache().records().empty());
   const auto particles = planeParticles(5000, Vec3::UnitZ(), 0.5f, 3);
   const std::vector<RecordRequest> elsewhere{{{5, 5, 0}, Vec3::UnitZ()}, {{0.5f, 0.5f, 0}, -Vec3::UnitZ()}};
-  trainer.learn(particles, elsewhere);
+  learn(trainer, particles, elsewhere);
   CHECK(trainer.cache().records().empty());
   const std::vector<RecordRequest> same(5, RecordRequest{{0.5f, 0.5f, 0}, Vec3::UnitZ()});
-  trainer.learn(particles, same);
+  learn(trainer, particles, same);
   CHECK(trainer.cache().records().size() == 1);
+}
+
+TEST_CASE("guiding: sources of any scale are learnt from alike, each by its effective number of samples") {
+  const Vec3 left = Vec3(-0.6f, 0.0f, 0.8f), right = Vec3(0.6f, 0.0f, 0.8f);
+  std::vector<Particle> dim = planeParticles(20000, left, 0.0f, 1), bright = planeParticles(20000, right, 0.0f, 2);
+  for (Particle& p : bright) p.weight *= 1e6f;
+  const Vec3 x(0.5f, 0.5f, 0);
+  const ParticleNeighbours both(std::array{std::span<const Particle>(dim), std::span<const Particle>(bright)}, 250, 1);
+  double sum = 0, asymmetry = 0;
+  for (const WeightedPoint& p : both.around(x, Vec3::UnitZ(), Vec3::UnitX()).points) {
+    sum += p.weight;
+    asymmetry += p.weight * std::copysign(1.0f, p.y.x());
+  }
+  CHECK(sum == Approx(500).epsilon(0.3));
+  CHECK(std::abs(asymmetry) < 0.2 * sum);
+
+  // One particle that outshines all others is one sample.
+  dim.front().position = x;
+  dim.front().weight = 1e6f;
+  sum = 0;
+  const ParticleNeighbours spoilt(std::array{std::span<const Particle>(dim)}, 250, 1);
+  for (const WeightedPoint& p : spoilt.around(x, Vec3::UnitZ(), Vec3::UnitX()).points) sum += p.weight;
+  CHECK(sum == Approx(1).epsilon(0.01));
+}
+
+TEST_CASE("guiding: the nearest particles are found, all of them") {
+  Rng rng(5);
+  std::vector<Particle> particles = planeParticles(3000, Vec3::UnitZ(), 0.5f, 9);
+  for (int trial = 0; trial < 20; ++trial) {
+    const Vec3 x(rng.uniform(), rng.uniform(), 0);
+    std::vector<float> distances;
+    for (const Particle& p : particles) distances.push_back((p.position - x).norm());
+    std::ranges::sort(distances);
+    const ParticleNeighbours nearest(std::array{std::span<const Particle>(particles)}, 40, 10);
+    const Neighbourhood found = nearest.around(x, Vec3::UnitZ(), Vec3::UnitX());
+    CHECK(found.points.size() == 40);
+    CHECK(found.radius == Approx(distances[39]));
+    const ParticleNeighbours close(std::array{std::span<const Particle>(particles)}, 40, 0.5f * distances[39]);
+    CHECK(close.around(x, Vec3::UnitZ(), Vec3::UnitX()).radius < 0.5f * distances[39]);
+  }
 }
 
 TEST_CASE("guiding: bad training options are refused by name") {

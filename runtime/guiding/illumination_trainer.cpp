@@ -7,60 +7,45 @@
 #include <string>
 #include <unordered_map>
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <nanoflann.hpp>
 
 namespace lobe {
 namespace {
 
 constexpr float kNeighbourNormalCosine = 0.707f;
 constexpr int kUndersampledPerComponent = 5;
+// Of records made at the same time, in units: closer ones would often serve each other, farther ones make more rounds.
+constexpr float kRoundSpacing = 0.3f;
 
 void require(bool condition, const char* field, const char* rule) {
   if (!condition) throw std::runtime_error(std::string("training option ") + field + ": " + rule);
 }
 
-struct ParticlePositions {
-  std::span<const Particle> particles;
-  // The interface nanoflann asks of a data set; its names.
-  // NOLINTBEGIN(readability-identifier-naming)
-  std::size_t kdtree_get_point_count() const { return particles.size(); }
-  float kdtree_get_pt(std::size_t i, std::size_t axis) const {
-    return particles[i].position[static_cast<Eigen::Index>(axis)];
-  }
-  template <class Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-  // NOLINTEND(readability-identifier-naming)
-};
-
-using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, ParticlePositions>,
-                                                   ParticlePositions, 3, std::uint32_t>;
-
-/// Records placed during one pass, for the question whether one of them already serves a point.
-class PlacedRecords {
+/// Points with normals in cells of the largest radius, for questions of the sort "which of them are near".
+template <class Value>
+class PointGrid {
  public:
-  explicit PlacedRecords(float cellSize) : cellSize_(cellSize) {}
+  explicit PointGrid(float cellSize) : cellSize_(cellSize) {}
 
-  void add(const Vec3& x, const Vec3& n, float radius) { cells_[key(cell(x))].push_back({x, n, radius}); }
+  void add(const Vec3& x, const Vec3& n, const Value& value) { cells_[key(cell(x))].push_back({x, n, value}); }
 
-  bool serves(const Vec3& x, const Vec3& n) const {
+  /// Whether f(distance², value) holds for a point closer than a cell whose normal is less than 45° from n.
+  template <class Predicate>
+  bool any(const Vec3& x, const Vec3& n, const Predicate& f) const {
     const Eigen::Vector3i centre = cell(x);
     for (int i = 0; i < 27; ++i) {
       const auto found = cells_.find(key(centre + Eigen::Vector3i(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1)));
       if (found == cells_.end()) continue;
-      for (const Placed& p : found->second)
-        if ((p.x - x).squaredNorm() <= p.radius * p.radius && p.n.dot(n) >= kNeighbourNormalCosine) return true;
+      for (const Entry& e : found->second)
+        if (e.n.dot(n) >= kNeighbourNormalCosine && f((e.x - x).squaredNorm(), e.value)) return true;
     }
     return false;
   }
 
  private:
-  struct Placed {
+  struct Entry {
     Vec3 x, n;
-    float radius;
+    Value value;
   };
   Eigen::Vector3i cell(const Vec3& x) const { return (x / cellSize_).array().floor().cast<int>(); }
   static std::uint64_t key(const Eigen::Vector3i& c) {
@@ -68,8 +53,21 @@ class PlacedRecords {
            static_cast<std::uint32_t>(c.z()) * 83492791ull << 32;
   }
   float cellSize_;
-  std::unordered_map<std::uint64_t, std::vector<Placed>> cells_;
+  std::unordered_map<std::uint64_t, std::vector<Entry>> cells_;
 };
+
+/// Takes requests out of `waiting`, in order, that are farther from one another than the distance; the others stay.
+std::vector<RecordRequest> takeApart(std::vector<RecordRequest>& waiting, float distance) {
+  PointGrid<char> grid(distance);
+  std::vector<RecordRequest> taken, left;
+  for (const RecordRequest& r : waiting) {
+    const bool close = grid.any(r.position, r.normal, [&](float d2, char) { return d2 <= distance * distance; });
+    (close ? left : taken).push_back(r);
+    if (!close) grid.add(r.position, r.normal, 0);
+  }
+  waiting = std::move(left);
+  return taken;
+}
 
 }  // namespace
 
@@ -80,102 +78,82 @@ void TrainingOptions::validate() const {
   require(klThreshold > 0, "kl-threshold", "over 0");
 }
 
-/// The particles of a pass, found by position.
-class IlluminationTrainer::Neighbours {
- public:
-  Neighbours(std::span<const Particle> particles, int count, float maxDistance)
-      : positions_{particles}, count_(count), maxDistance_(maxDistance), tree_(3, positions_, {10}) {}
-
-  /// What the neighbours of a point say: disc points in the frame given, the distance of the farthest and the harmonic
-  /// mean of the distances that the light came from (+infinity when all comes from the environment).
-  struct Found {
-    std::vector<WeightedPoint> points;
-    float radius = 0;
-    float distance = std::numeric_limits<float>::infinity();
-  };
-
-  Found around(const Vec3& x, const Vec3& n, const Vec3& tangent) const {
-    std::vector<std::uint32_t> indices(count_);
-    std::vector<float> distances2(count_);
-    nanoflann::KNNResultSet<float, std::uint32_t> nearest(count_);
-    nearest.init(indices.data(), distances2.data());
-    // The set's worst distance is its last entry: filled beforehand, it bounds the search from the start.
-    distances2.back() = maxDistance_ * maxDistance_;
-    tree_.findNeighbors(nearest, x.data(), nanoflann::SearchParams());
-
-    Found found;
-    const Vec3 bitangent = n.cross(tangent);
-    double weight = 0, inverseDistance = 0;
-    for (std::size_t i = 0; i < nearest.size(); ++i) {
-      const Particle& p = positions_.particles[indices[i]];
-      const float cosine = p.direction.dot(n);
-      if (p.normal.dot(n) < kNeighbourNormalCosine || cosine <= 0) continue;
-      found.points.push_back({toDisc({p.direction.dot(tangent), p.direction.dot(bitangent), cosine}), p.weight});
-      found.radius = std::max(found.radius, std::sqrt(distances2[i]));
-      weight += p.weight;
-      inverseDistance += p.weight / p.distance;
-    }
-    if (inverseDistance > 0) found.distance = static_cast<float>(weight / inverseDistance);
-    return found;
-  }
-
- private:
-  ParticlePositions positions_;
-  std::size_t count_;
-  float maxDistance_;
-  KdTree tree_;
-};
-
 IlluminationTrainer::IlluminationTrainer(const TrainingOptions& options, float sceneDiagonal)
     : options_(options), unit_(options.unitShare * sceneDiagonal) {
   options.validate();
 }
 
-void IlluminationTrainer::learn(std::span<const Particle> particles, std::span<const RecordRequest> requests) {
-  if (particles.empty()) return;
-  const Neighbours neighbours(particles, options_.neighbours, unit_);
-  updateAll(neighbours);
+std::optional<double> IlluminationTrainer::learn(std::span<const std::span<const Particle>> sources,
+                                                 std::span<const RecordRequest> requests) {
+  const ParticleNeighbours neighbours(sources, options_.neighbours, unit_);
+  if (neighbours.empty()) return std::nullopt;
+  const std::optional<double> likelihood = updateAll(neighbours);
   makeRecords(neighbours, requests);
+  return likelihood;
 }
 
-void IlluminationTrainer::fill(std::span<const Particle> particles, std::span<const RecordRequest> requests) {
-  if (particles.empty()) return;
-  makeRecords(Neighbours(particles, options_.neighbours, unit_), requests);
+void IlluminationTrainer::fill(std::span<const std::span<const Particle>> sources,
+                               std::span<const RecordRequest> requests) {
+  const ParticleNeighbours neighbours(sources, options_.neighbours, unit_);
+  if (!neighbours.empty()) makeRecords(neighbours, requests);
 }
 
-void IlluminationTrainer::updateAll(const Neighbours& neighbours) {
+std::optional<double> IlluminationTrainer::updateAll(const ParticleNeighbours& neighbours) {
+  constexpr double none = std::numeric_limits<double>::quiet_NaN();
+  std::vector<double> likelihoods(records_.size(), none);
   tbb::parallel_for(std::size_t{0}, records_.size(), [&](std::size_t i) {
     Training& record = records_[i];
-    const auto found = neighbours.around(record.position, record.normal, record.tangent);
+    const Neighbourhood found = neighbours.around(record.position, record.normal, record.tangent);
     if (found.points.empty()) return;
+    likelihoods[i] = meanLogLikelihood(found.points, record.em.gaussians(), record.em.background());
     record.em.update(found.points);
     shrinkRadius(record);
   });
+  double sum = 0;
+  long count = 0;
+  for (const double value : likelihoods)
+    if (std::isfinite(value)) sum += value, ++count;
+  if (count == 0) return std::nullopt;
+  return sum / static_cast<double>(count);
 }
 
-void IlluminationTrainer::place(const Neighbours& neighbours, std::span<const RecordRequest> requests) {
-  PlacedRecords placed(unit_);
-  for (const RecordRequest& request : requests) {
-    if (cache_.find(request.position, request.normal) || placed.serves(request.position, request.normal)) continue;
-    const Vec3 tangent = request.normal.unitOrthogonal();
-    const auto found = neighbours.around(request.position, request.normal, tangent);
-    if (found.points.empty()) continue;
-    const float radius = std::clamp(found.radius, 0.1f * unit_, unit_);
-    placed.add(request.position, request.normal, radius);
-    records_.push_back({request.position, request.normal, tangent, radius, found.distance,
-                        StepwiseEm(options_.components, options_.em)});
+// Requests are served in their order, yet many at a time: each round takes some that are not too close to one another.
+// A record that turns out to be served by one before it is dropped, so the result is that of one request at a time.
+void IlluminationTrainer::makeRecords(const ParticleNeighbours& neighbours, std::span<const RecordRequest> requests) {
+  PointGrid<float> placed(unit_);  // with radii
+  const auto isServed = [&](const RecordRequest& r) {
+    return placed.any(r.position, r.normal, [](float d2, float radius) { return d2 <= radius * radius; });
+  };
+  std::vector<RecordRequest> waiting;
+  for (const RecordRequest& request : requests)
+    if (!cache_.find(request.position, request.normal)) waiting.push_back(request);
+  while (!waiting.empty()) {
+    std::erase_if(waiting, isServed);
+    const std::vector<RecordRequest> round = takeApart(waiting, kRoundSpacing * unit_);
+    std::vector<std::optional<Training>> made(round.size());
+    tbb::parallel_for(std::size_t{0}, round.size(), [&](std::size_t i) { made[i] = makeRecord(neighbours, round[i]); });
+    for (std::size_t i = 0; i < round.size(); ++i) {
+      if (isServed(round[i])) continue;
+      // Where there is no particle, asking again close by is in vain.
+      placed.add(round[i].position, round[i].normal, made[i] ? made[i]->radius : kRoundSpacing * unit_);
+      if (made[i]) records_.push_back(std::move(*made[i]));
+    }
   }
+  limitRadii();
+  rebuildCache();
 }
 
-void IlluminationTrainer::makeRecords(const Neighbours& neighbours, std::span<const RecordRequest> requests) {
-  const std::size_t first = records_.size();
-  place(neighbours, requests);
-  tbb::parallel_for(first, records_.size(), [&](std::size_t i) {
-    Training& record = records_[i];
-    record.em.fit(neighbours.around(record.position, record.normal, record.tangent).points);
-    shrinkRadius(record);
-  });
-  rebuildCache();
+std::optional<IlluminationTrainer::Training> IlluminationTrainer::makeRecord(const ParticleNeighbours& neighbours,
+                                                                             const RecordRequest& request) const {
+  const Vec3 tangent = request.normal.unitOrthogonal();
+  const Neighbourhood found = neighbours.around(request.position, request.normal, tangent);
+  if (found.points.empty()) return std::nullopt;
+  Training record{request.position, request.normal,
+                  tangent,          std::clamp(found.radius, 0.1f * unit_, unit_),
+                  found.distance,   StepwiseEm(options_.components, options_.em)};
+  record.em.fit(found.points);
+  shrinkRadius(record);
+  return record;
 }
 
 void IlluminationTrainer::shrinkRadius(Training& record) const {
@@ -191,6 +169,22 @@ void IlluminationTrainer::shrinkRadius(Training& record) const {
   const auto parallax = static_cast<float>(record.distance / inverse);
   const float allowed = std::max({parallax, 0.5f * record.radius, 0.1f * unit_});
   record.radius = std::min(record.radius, allowed);
+}
+
+// No record is valid farther out than its neighbours allow: R_i ≤ R_j + |x_i − x_j|. Light that changes fast around one
+// record does so for those beside it.
+void IlluminationTrainer::limitRadii() {
+  PointGrid<float> grid(unit_);
+  for (const Training& r : records_) grid.add(r.position, r.normal, r.radius);
+  tbb::parallel_for(std::size_t{0}, records_.size(), [&](std::size_t i) {
+    Training& record = records_[i];
+    float limit = record.radius;
+    grid.any(record.position, record.normal, [&](float d2, float radius) {
+      limit = std::min(limit, radius + std::sqrt(d2));
+      return false;
+    });
+    record.radius = std::max(limit, 0.1f * unit_);
+  });
 }
 
 void IlluminationTrainer::rebuildCache() {

@@ -4,18 +4,19 @@
 // Results depend on the particles, the requests and their order, never on threads: records are placed one after another
 // in the order of the requests, and each is fitted by itself.
 
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "runtime/guiding/illumination_cache.h"
-#include "runtime/guiding/particle.h"
+#include "runtime/guiding/particle_neighbours.h"
 #include "runtime/mixture/em.h"
 
 namespace lobe {
 
 struct TrainingOptions {
   int components = 8;        ///< Gaussians a record, 1 to 8
-  int neighbours = 250;      ///< particles a record is updated from, at most
+  int neighbours = 250;      ///< particles of each source that a record is updated from, at most
   float unitShare = 0.02f;   ///< the length u, as a share of the scene's bounding-box diagonal
   float klThreshold = 5.0f;  ///< κ, how far in standard deviations a component may move before a record is invalid
   StepwiseEmOptions em;
@@ -30,11 +31,14 @@ class IlluminationTrainer {
   IlluminationTrainer(const TrainingOptions& options, float sceneDiagonal);
 
   /// One pass: updates every record from the particles around it, then makes a record for each request that no record
-  /// serves yet and that has particles around it.
-  void learn(std::span<const Particle> particles, std::span<const RecordRequest> requests);
+  /// serves yet and that has particles around it. Sources: as ParticleNeighbours; empty ones are fine. Returns the mean
+  /// over the records of log p(particle) (nats, over the disc's area) as it was before they were learnt from: a measure
+  /// on particles held out. nullopt: no record has met a particle.
+  std::optional<double> learn(std::span<const std::span<const Particle>> sources,
+                              std::span<const RecordRequest> requests);
 
   /// Makes records for requests that none serves from particles that the others have already learnt from.
-  void fill(std::span<const Particle> particles, std::span<const RecordRequest> requests);
+  void fill(std::span<const std::span<const Particle>> sources, std::span<const RecordRequest> requests);
 
   /// What has been learnt so far.
   const IlluminationCache& cache() const { return cache_; }
@@ -50,12 +54,12 @@ class IlluminationTrainer {
     float distance;  // mean distance that the light came from
     StepwiseEm em;
   };
-  class Neighbours;
 
-  void updateAll(const Neighbours& neighbours);
-  void makeRecords(const Neighbours& neighbours, std::span<const RecordRequest> requests);
-  void place(const Neighbours& neighbours, std::span<const RecordRequest> requests);
+  std::optional<double> updateAll(const ParticleNeighbours& neighbours);
+  void makeRecords(const ParticleNeighbours& neighbours, std::span<const RecordRequest> requests);
+  std::optional<Training> makeRecord(const ParticleNeighbours& neighbours, const RecordRequest& request) const;
   void shrinkRadius(Training& record) const;
+  void limitRadii();
   void rebuildCache();
 
   TrainingOptions options_;

@@ -56,7 +56,8 @@ class StepwiseEm {
   StepwiseEm(int components, const StepwiseEmOptions& options);
 
   /// First fit, from nothing: starts from the points themselves (deterministically) and sweeps until the likelihood
-  /// settles. The samples seen become the number of points that count; if there is none, nothing changes.
+  /// settles. The samples seen become the number of points that count; if there is none, nothing changes. Priors weigh
+  /// against the effective number of samples, (Σw)²/Σw², not their count: a bright particle among dim ones is one.
   void fit(std::span<const WeightedPoint> points);
 
   /// One sweep of on-line EM over new points.
@@ -77,7 +78,7 @@ class StepwiseEm {
   template <int lanes>
   class Sweep;
   void spread(std::span<const WeightedPoint> points);
-  double sweep(std::span<const WeightedPoint> points, long priorLimit);
+  double sweep(std::span<const WeightedPoint> points, double evidenceBefore, double evidenceAfter);
 
   StepwiseEmOptions options_;
   Mixture gaussians_;
@@ -85,6 +86,7 @@ class StepwiseEm {
   std::vector<Statistics> statistics_;
   double backgroundWeight_ = 0;
   double totalWeight_ = 0;
+  double evidence_ = 0;  // effective samples so far, what priors weigh against
   long samples_ = 0;
 };
 

@@ -24,6 +24,24 @@ bool counts(const WeightedPoint& p) {
   return p.weight > 0 && std::isfinite(p.weight) && insideDisc(p.y);
 }
 
+struct Evidence {
+  long points = 0;
+  double effective = 0;
+};
+
+Evidence evidenceOf(std::span<const WeightedPoint> points) {
+  Evidence evidence;
+  double sum = 0, squares = 0;
+  for (const WeightedPoint& p : points) {
+    if (!counts(p)) continue;
+    ++evidence.points;
+    sum += p.weight;
+    squares += static_cast<double>(p.weight) * p.weight;
+  }
+  if (squares > 0) evidence.effective = sum * sum / squares;
+  return evidence;
+}
+
 float backgroundPdf(const Vec2& y) {
   return 2.0f * kInvPi * discCosine(y);
 }
@@ -217,29 +235,35 @@ void StepwiseEm::spread(std::span<const WeightedPoint> points) {
 }
 
 void StepwiseEm::fit(std::span<const WeightedPoint> points) {
-  const auto valid = std::count_if(points.begin(), points.end(), counts);
-  if (valid == 0) return;
+  const Evidence evidence = evidenceOf(points);
+  if (evidence.points == 0) return;
   *this = StepwiseEm(static_cast<int>(gaussians_.size()), options_);
   spread(points);
   double previous = -std::numeric_limits<double>::infinity();
   for (int i = 0; i < options_.maxSweeps; ++i) {
-    const double likelihood = sweep(points, valid);
+    const double likelihood = sweep(points, i == 0 ? 0.0 : evidence.effective, evidence.effective);
     if (std::abs(likelihood - previous) <= options_.tolerance) break;
     previous = likelihood;
   }
-  samples_ = valid;
+  samples_ = evidence.points;
+  evidence_ = evidence.effective;
 }
 
 void StepwiseEm::update(std::span<const WeightedPoint> points) {
-  sweep(points, std::numeric_limits<long>::max());
+  const double after = evidence_ + evidenceOf(points).effective;
+  sweep(points, evidence_, after);
+  evidence_ = after;
 }
 
 // Returns the weighted mean of the log-likelihood as it was before each point was taken in.
-double StepwiseEm::sweep(std::span<const WeightedPoint> points, long priorLimit) {
+double StepwiseEm::sweep(std::span<const WeightedPoint> points, double evidenceBefore, double evidenceAfter) {
   const auto run = [&]<int lanes>() {
     Sweep<lanes> state(*this);
     double likelihood = 0, weight = 0;
     int waiting = 0;
+    const auto evidence = [&](std::size_t taken) {
+      return std::lerp(evidenceBefore, evidenceAfter, static_cast<double>(taken) / static_cast<double>(points.size()));
+    };
     const std::size_t stride = scatteringStride(points.size());
     for (std::size_t i = 0, at = 0; i < points.size(); ++i, at = (at + stride) % points.size()) {
       const WeightedPoint& p = points[at];
@@ -249,10 +273,10 @@ double StepwiseEm::sweep(std::span<const WeightedPoint> points, long priorLimit)
       likelihood += p.weight * std::log(std::max(density, std::numeric_limits<float>::min()));
       weight += p.weight;
       if (++waiting < options_.samplesPerUpdate) continue;
-      state.maximise(static_cast<double>(std::min(samples_, priorLimit)));
+      state.maximise(evidence(i + 1));
       waiting = 0;
     }
-    if (waiting > 0) state.maximise(static_cast<double>(std::min(samples_, priorLimit)));
+    if (waiting > 0) state.maximise(evidence(points.size()));
     state.store(*this);
     return weight > 0 ? likelihood / weight : 0.0;
   };

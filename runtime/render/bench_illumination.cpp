@@ -64,13 +64,13 @@ std::vector<Particle> heldOutParticles(const RenderScene& scene, const RayCamera
   const GuidedSampler sampler(scene.scene, nothing, nullptr);
   std::optional<EnvironmentGuide> guide;
   if (scene.lights.environmentProbability() > 0) guide.emplace(scene.lights);
-  const ParticleTracer tracer(scene, camera, sampler, guide ? &*guide : nullptr, kHeldOutSeed);
+  const ParticleTracer tracer(scene, camera, sampler, sampler, guide ? &*guide : nullptr, kHeldOutSeed);
   if (guide) {
-    for (const EnvironmentUse& use : tracer.traceImportons(0, 8 * o.plan.importons).uses)
+    for (const EnvironmentUse& use : tracer.traceImportons(0, 8 * o.plan.importons, {.uses = true}).uses)
       guide->learn(use.point, use.wi, use.weight);
     guide->update();
   }
-  return tracer.tracePhotons(0, o.heldOutPhotons);
+  return tracer.tracePhotons(0, o.heldOutPhotons).particles;
 }
 
 Exam makeExam(const RenderScene& scene, const RayCamera& camera, const Options& o, const IlluminationCache& best) {

@@ -24,6 +24,9 @@ constexpr std::uint64_t kMaxSeed = std::uint64_t{1} << 53;  // a picture's metad
 
 const std::vector<std::string> kIntegratorNames{"path", "guided", "product"};  // in the order of IntegratorKind
 
+const std::map<std::string, TrainFrom> kTrainFromNames{
+    {"photons", TrainFrom::photons}, {"paths", TrainFrom::paths}, {"both", TrainFrom::both}};
+
 struct Options {
   RenderJob job;
   std::string size, integrator = "product";
@@ -32,6 +35,9 @@ struct Options {
 
 void declareTraining(CLI::App& app, RenderJob& job) {
   TrainingPlan& plan = job.training;
+  app.add_option("--train", plan.from, "What records learn from: photons, paths (of the camera) or both")
+      ->transform(CLI::CheckedTransformer(kTrainFromNames))
+      ->default_str("both");
   app.add_option("--passes", plan.passes, "Training passes")->capture_default_str();
   app.add_option("--photons", plan.photons, "Photons a pass")->capture_default_str();
   app.add_option("--importons", plan.importons, "Importons a pass")->capture_default_str();

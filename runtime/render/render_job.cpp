@@ -150,6 +150,14 @@ class Stopwatch {
   Clock::time_point start_ = Clock::now();
 };
 
+nlohmann::ordered_json asJson(const PassReport& pass) {
+  return {{"seconds", pass.seconds},
+          {"particles", pass.particles},
+          {"particles_per_second", static_cast<double>(pass.particles) / pass.seconds},
+          {"records", pass.records},
+          {"log_likelihood", pass.logLikelihood ? nlohmann::ordered_json(*pass.logLikelihood) : nullptr}};
+}
+
 nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, const RunResult& run) {
   const PathStatistics& paths = run.render.statistics;
   const RenderProgress& total = run.render.total;
@@ -159,6 +167,8 @@ nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, c
   for (std::size_t i = 0; i < kSamplingStrategyNames.size(); ++i)
     shares[kSamplingStrategyNames[i]] =
         decisions > 0 ? static_cast<double>(paths.strategies[i]) / static_cast<double>(decisions) : 0.0;
+  nlohmann::ordered_json passes = nlohmann::ordered_json::array();
+  for (const PassReport& pass : run.training().passes) passes.push_back(asJson(pass));
   return {{"integrator", nameOf(job.integrator)},
           {"seed", job.seed},
           {"seconds_reading", load.reading},
@@ -173,8 +183,8 @@ nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, c
           {"segments_per_second", static_cast<double>(paths.segments) / total.seconds},
           {"mean_path_length", static_cast<double>(paths.segments) / static_cast<double>(paths.paths)},
           {"peak_rss_bytes", peakResidentBytes()},
-          {"training_passes", run.training().passes},
-          {"training_particles", run.training().particles},
+          {"training_passes", passes},
+          {"training_particles", run.training().particles()},
           {"records", run.guiding.training.cache.records().size()},
           {"records_undersampled_share", run.training().undersampledShare},
           {"record_bytes", run.guiding.training.cache.bytes()},

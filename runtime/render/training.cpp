@@ -1,9 +1,77 @@
 #include "runtime/render/training.h"
 
+#include <array>
 #include <chrono>
 #include <stdexcept>
 
 namespace lobe {
+namespace {
+
+class Stopwatch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point start_ = Clock::now();
+};
+
+/// One training run. Importons are guided by the light learnt in the passes before, photons by the importance that
+/// importons have brought.
+class Training {
+ public:
+  Training(const RenderScene& scene, const RayCamera& camera, const BrdfCaches* caches, const TrainingPlan& plan)
+      : plan_(plan),
+        radiance_(plan.records, scene.tracer.bounds().diagonal().norm()),
+        importance_(plan.records, scene.tracer.bounds().diagonal().norm()),
+        radianceSampler_(scene.scene, radiance_.cache(), caches),
+        importanceSampler_(scene.scene, importance_.cache(), nullptr) {
+    const bool tracesPhotons = plan.from != TrainFrom::paths;
+    if (tracesPhotons && scene.lights.environmentProbability() > 0) guide_.emplace(scene.lights);
+    wishes_ = {guide_.has_value(), tracesPhotons, plan.from != TrainFrom::photons};
+    tracer_.emplace(scene, camera, radianceSampler_, importanceSampler_, guide_ ? &*guide_ : nullptr, plan.seed);
+  }
+  // Tracer and samplers refer to the other members.
+  Training(const Training&) = delete;
+  Training& operator=(const Training&) = delete;
+
+  PassReport runPass(int pass) {
+    const Stopwatch watch;
+    ImportonResult importons = tracer_->traceImportons(pass, plan_.importons, wishes_);
+    if (guide_) {
+      for (const EnvironmentUse& use : importons.uses) guide_->learn(use.point, use.wi, use.weight);
+      guide_->update();
+    }
+    samples_ = std::move(importons.samples);
+    if (wishes_.importance) {
+      PhotonResult photons = tracer_->tracePhotons(pass, plan_.photons);
+      photons_ = std::move(photons.particles);
+      importance_.learn(std::array{std::span<const Particle>(importons.importance)}, photons.requests);
+    }
+    PassReport report{0, photons_.size() + samples_.size(), 0, radiance_.learn(sources(), importons.requests)};
+    report.records = radiance_.cache().records().size();
+    report.seconds = watch.seconds();
+    return report;
+  }
+
+  /// Radii have shrunk since the last requests were made: a last look closes the gaps.
+  void finish(int passes) { radiance_.fill(sources(), tracer_->traceImportons(passes, plan_.importons, {}).requests); }
+
+  const IlluminationTrainer& radiance() const { return radiance_; }
+
+ private:
+  std::array<std::span<const Particle>, 2> sources() const { return {photons_, samples_}; }
+
+  const TrainingPlan& plan_;
+  IlluminationTrainer radiance_, importance_;
+  GuidedSampler radianceSampler_, importanceSampler_;
+  std::optional<EnvironmentGuide> guide_;
+  ImportonWishes wishes_;
+  std::optional<ParticleTracer> tracer_;
+  std::vector<Particle> photons_, samples_;  // of the last pass
+};
+
+}  // namespace
 
 void TrainingPlan::validate() const {
   const auto require = [](bool condition, const char* message) {
@@ -16,39 +84,29 @@ void TrainingPlan::validate() const {
   records.validate();
 }
 
+std::uint64_t TrainingReport::particles() const {
+  std::uint64_t sum = 0;
+  for (const PassReport& pass : passes) sum += pass.particles;
+  return sum;
+}
+
 TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera& camera, const BrdfCaches* caches,
                                       const TrainingPlan& plan, const std::function<void(int)>& afterPass) {
-  using Clock = std::chrono::steady_clock;
   plan.validate();
-  const Clock::time_point start = Clock::now();
-  const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
-
   if (scene.tracer.bounds().isEmpty() || scene.lights.empty()) return {};
-  IlluminationTrainer trainer(plan.records, scene.tracer.bounds().diagonal().norm());
-  const GuidedSampler sampler(scene.scene, trainer.cache(), caches);
-  std::optional<EnvironmentGuide> guide;
-  if (scene.lights.environmentProbability() > 0) guide.emplace(scene.lights);
-  const ParticleTracer tracer(scene, camera, sampler, guide ? &*guide : nullptr, plan.seed);
-
+  const Stopwatch watch;
+  Training training(scene, camera, caches, plan);
   TrainingReport report;
-  std::vector<Particle> particles;
-  while (report.passes < plan.passes && (report.passes == 0 || seconds() < plan.seconds)) {
-    const ImportonResult importons = tracer.traceImportons(report.passes, plan.importons);
-    if (guide) {
-      for (const EnvironmentUse& use : importons.uses) guide->learn(use.point, use.wi, use.weight);
-      guide->update();
-    }
-    particles = tracer.tracePhotons(report.passes, plan.photons);
-    report.particles += particles.size();
-    trainer.learn(particles, importons.requests);
-    ++report.passes;
-    if (afterPass) afterPass(report.passes);
+  int passes = 0;
+  while (passes < plan.passes && (passes == 0 || watch.seconds() < plan.seconds)) {
+    report.passes.push_back(training.runPass(passes));
+    ++passes;
+    if (afterPass) afterPass(passes);
   }
-  // Radii have shrunk since the last requests were made: a last look closes the gaps.
-  trainer.fill(particles, tracer.traceImportons(report.passes, plan.importons).requests);
-  report.seconds = seconds();
-  report.undersampledShare = trainer.undersampledShare();
-  return {trainer.cache(), report};
+  training.finish(passes);
+  report.seconds = watch.seconds();
+  report.undersampledShare = training.radiance().undersampledShare();
+  return {training.radiance().cache(), report};
 }
 
 }  // namespace lobe

@@ -2,15 +2,20 @@
 // Trains the illumination of a scene, pass by pass.
 
 #include <functional>
+#include <vector>
 
 #include "runtime/guiding/illumination_trainer.h"
 #include "runtime/render/particle_tracer.h"
 
 namespace lobe {
 
+/// What records learn from.
+enum class TrainFrom { photons, paths, both };
+
 struct TrainingPlan {
+  TrainFrom from = TrainFrom::both;
   int passes = 8;
-  int photons = 300000;        ///< a pass
+  int photons = 300000;        ///< a pass; none are traced for TrainFrom::paths
   int importons = 100000;      ///< a pass
   double seconds = kInfinity;  ///< no pass starts after that; the result then depends on the machine's speed
   std::uint64_t seed = 1;
@@ -20,11 +25,20 @@ struct TrainingPlan {
   void validate() const;
 };
 
+struct PassReport {
+  double seconds;
+  std::uint64_t particles;  ///< that records could learn from
+  std::size_t records;      ///< after the pass
+  /// Of the pass's particles before they were learnt from, see IlluminationTrainer::learn.
+  std::optional<double> logLikelihood;
+};
+
 struct TrainingReport {
-  int passes = 0;
-  std::uint64_t particles = 0;
+  std::vector<PassReport> passes;
   double seconds = 0;
   double undersampledShare = 0;
+
+  std::uint64_t particles() const;
 };
 
 struct TrainedIllumination {

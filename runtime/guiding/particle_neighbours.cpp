@@ -1,0 +1,148 @@
+#include "runtime/guiding/particle_neighbours.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Geometry>
+#include <nanoflann.hpp>
+
+namespace lobe {
+namespace {
+
+constexpr float kNeighbourNormalCosine = 0.707f;
+
+struct ParticlePositions {
+  std::span<const Particle> particles;
+  // The interface nanoflann asks of a data set; its names.
+  // NOLINTBEGIN(readability-identifier-naming)
+  std::size_t kdtree_get_point_count() const { return particles.size(); }
+  float kdtree_get_pt(std::size_t i, std::size_t axis) const {
+    return particles[i].position[static_cast<Eigen::Index>(axis)];
+  }
+  template <class Box>
+  bool kdtree_get_bbox(Box&) const {
+    return false;
+  }
+  // NOLINTEND(readability-identifier-naming)
+};
+
+using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, ParticlePositions>,
+                                                   ParticlePositions, 3, std::uint32_t>;
+
+/// The nearest `count` points in no order. nanoflann's own set keeps them sorted, which costs more than the search:
+/// this one collects twice as many and then drops the farther half.
+class NearestSet {
+ public:
+  using DistanceType = float;
+  struct Neighbour {
+    float distance2;
+    std::uint32_t index;
+  };
+
+  NearestSet(std::size_t count, float maxDistance2) : count_(count), worst_(maxDistance2) {
+    neighbours_.reserve(2 * count);
+  }
+
+  std::span<const Neighbour> finish() {
+    if (neighbours_.size() > count_) drop();
+    return neighbours_;
+  }
+
+  // The interface nanoflann asks of a result set; its names.
+  // NOLINTBEGIN(readability-identifier-naming)
+  bool full() const { return true; }  // the bound holds from the start
+  float worstDist() const { return worst_; }
+  bool addPoint(float distance2, std::uint32_t index) {
+    if (distance2 >= worst_) return true;
+    neighbours_.push_back({distance2, index});
+    if (neighbours_.size() == 2 * count_) drop();
+    return true;
+  }
+  // NOLINTEND(readability-identifier-naming)
+
+ private:
+  void drop() {
+    const auto last = neighbours_.begin() + static_cast<std::ptrdiff_t>(count_) - 1;
+    std::nth_element(neighbours_.begin(), last, neighbours_.end(), [](const Neighbour& a, const Neighbour& b) {
+      return a.distance2 != b.distance2 ? a.distance2 < b.distance2 : a.index < b.index;
+    });
+    neighbours_.resize(count_);
+    worst_ = neighbours_.back().distance2;
+  }
+
+  std::size_t count_;
+  float worst_;
+  std::vector<Neighbour> neighbours_;
+};
+
+/// Sums over one source.
+struct Tally {
+  double weight = 0, squares = 0, inverseDistance = 0;
+  float radius2 = 0;
+
+  double effectiveSamples() const { return squares > 0 ? weight * weight / squares : 0; }
+};
+
+}  // namespace
+
+class ParticleNeighbours::Tree {
+ public:
+  Tree(std::span<const Particle> particles, int count, float maxDistance)
+      : positions_{particles}, count_(count), maxDistance2_(maxDistance * maxDistance), tree_(3, positions_, {16}) {}
+
+  Tally collect(const Vec3& x, const Vec3& n, const Vec3& tangent, std::vector<WeightedPoint>& points) const {
+    NearestSet nearest(count_, maxDistance2_);
+    tree_.findNeighbors(nearest, x.data(), nanoflann::SearchParams());
+    const Vec3 bitangent = n.cross(tangent);
+    Tally tally;
+    for (const NearestSet::Neighbour& neighbour : nearest.finish()) {
+      const Particle& p = positions_.particles[neighbour.index];
+      const float cosine = p.direction.dot(n);
+      if (p.normal.dot(n) < kNeighbourNormalCosine || cosine <= 0) continue;
+      points.push_back({toDisc({p.direction.dot(tangent), p.direction.dot(bitangent), cosine}), p.weight});
+      tally.radius2 = std::max(tally.radius2, neighbour.distance2);
+      tally.weight += p.weight;
+      tally.squares += static_cast<double>(p.weight) * p.weight;
+      tally.inverseDistance += p.weight / p.distance;
+    }
+    return tally;
+  }
+
+ private:
+  ParticlePositions positions_;
+  std::size_t count_;
+  float maxDistance2_;
+  KdTree tree_;
+};
+
+ParticleNeighbours::ParticleNeighbours(std::span<const std::span<const Particle>> sources, int count,
+                                       float maxDistance) {
+  for (const std::span<const Particle>& source : sources)
+    if (!source.empty()) trees_.push_back(std::make_unique<Tree>(source, count, maxDistance));
+}
+
+ParticleNeighbours::~ParticleNeighbours() = default;
+
+Neighbourhood ParticleNeighbours::around(const Vec3& x, const Vec3& n, const Vec3& tangent) const {
+  Neighbourhood all;
+  double weight = 0, inverseDistance = 0, most = 0;
+  for (const std::unique_ptr<Tree>& tree : trees_) {
+    const std::size_t first = all.points.size();
+    const Tally tally = tree->collect(x, n, tangent, all.points);
+    const double effective = tally.effectiveSamples();
+    if (!(effective > 0)) continue;
+    const double scale = effective / tally.weight;
+    for (std::size_t i = first; i < all.points.size(); ++i)
+      all.points[i].weight = static_cast<float>(all.points[i].weight * scale);
+    weight += effective;
+    inverseDistance += tally.inverseDistance * scale;
+    if (effective > most) {
+      most = effective;
+      all.radius = std::sqrt(tally.radius2);
+    }
+  }
+  if (inverseDistance > 0) all.distance = static_cast<float>(weight / inverseDistance);
+  return all;
+}
+
+}  // namespace lobe

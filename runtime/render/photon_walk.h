@@ -1,0 +1,42 @@
+#pragma once
+// One photon in training: light carried from an emitter to all surfaces that it meets.
+
+#include <vector>
+
+#include "runtime/guiding/particle.h"
+#include "runtime/render/environment_guide.h"
+#include "runtime/render/particle_flight.h"
+
+namespace lobe {
+
+struct PhotonResult {
+  std::vector<Particle> particles;      ///< every arrival at a surface that is not only delta
+  std::vector<RecordRequest> requests;  ///< where guiding by importance found no record
+};
+
+class PhotonWalk {
+ public:
+  /// All outlive it; the walk appends to the result. importance: guides directions, it has learnt from importons.
+  PhotonWalk(const RenderScene& scene, const GuidedSampler& importance, Rng& rng, PhotonResult& result)
+      : scene_(scene), importance_(importance), rng_(rng), result_(result) {}
+
+  void run(const EmittedPhoton& photon);
+
+ private:
+  struct Branch {
+    Flight flight;
+    int depth;
+  };
+  void advance(const EmittedPhoton& photon, Branch branch);
+  void store(const EmittedPhoton& photon, const Branch& branch, const SurfaceHit& hit);
+  int applyWeightWindow(Rgb& weight);
+
+  const RenderScene& scene_;
+  const GuidedSampler& importance_;
+  Rng& rng_;
+  PhotonResult& result_;
+  float power_ = 0;  // emitted, luminance
+  std::vector<Branch> waiting_;
+};
+
+}  // namespace lobe
