@@ -211,7 +211,7 @@ TEST_CASE("render: what emitter sampling does alone is not learnt") {
   const GuidedSampler sampler(scene, nothing, nullptr);
   const RayCamera camera({}, {});
   const auto particles = [&](const RenderScene& s) {
-    return ParticleTracer(s, camera, sampler, nullptr, 1).tracePhotons(0, 2000).size();
+    return ParticleTracer(s, camera, sampler, sampler, nullptr, 1).tracePhotons(0, 2000).particles.size();
   };
   CHECK(particles(ready) == 0);
   addShape(scene, Sphere{{0, 5, 0}, 4}, 0);  // what comes from the floor by way of a sphere is
