@@ -138,7 +138,7 @@ nlohmann::ordered_json row(const Exam& exam, const Trained& trained) {
   nlohmann::ordered_json json{{"passes", trained.passes}};
   json.update(grade(exam, trained.illumination.cache));
   json["seconds"] = trained.illumination.report.seconds;
-  json["particles"] = trained.illumination.report.particles;
+  json["particles"] = trained.illumination.report.particles();
   json["records"] = trained.illumination.cache.records().size();
   json["record_bytes"] = trained.illumination.cache.bytes();
   return json;
