@@ -50,6 +50,20 @@ TEST_CASE("render: lobecompare tells errors to people and machines") {
     CHECK(unwritable.code == 1);
     CHECK(unwritable.error.find("lobecompare: error: /nowhere/map.png: cannot write") == 0);
   }
+  SECTION("a larger reference is averaged down") {
+    const std::string large = folder / "large.exr";
+    Image pixels(20, 20);
+    for (int y = 0; y < 20; ++y)
+      for (int x = 0; x < 20; ++x) pixels.at(x, y) = grey((x + y) % 2 == 0 ? 0.2f : 0.8f);
+    writeImage(large, pixels);
+    const ToolRun run = lobecompare(large + " " + image + " --shrink 2 --json");
+    REQUIRE(run.code == 0);
+    CHECK(nlohmann::json::parse(run.out)[0]["mse"].get<double>() == Approx(0.01));
+    const ToolRun uneven = lobecompare(large + " " + image + " --shrink 3");
+    CHECK(uneven.code == 1);
+    CHECK(uneven.error == fmt::format("lobecompare: error: {}: 20x20 pixels are not squares of 3 a side\n", large));
+    CHECK(lobecompare(large + " " + image + " --shrink 0").code == 2);
+  }
   SECTION("faults") {
     CHECK(lobecompare("").code == 2);
     CHECK(lobecompare(reference).code == 2);

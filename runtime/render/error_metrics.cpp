@@ -42,6 +42,17 @@ double squaredDistance(const Rgb& a, const Rgb& b) {
 
 }  // namespace
 
+Image averagedDown(const Image& image, int factor) {
+  if (factor < 1 || image.width % factor != 0 || image.height % factor != 0)
+    throw std::runtime_error(
+        fmt::format("{}x{} pixels are not squares of {} a side", image.width, image.height, factor));
+  Image result(image.width / factor, image.height / factor);
+  const float share = 1.0f / static_cast<float>(factor * factor);
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) result.at(x / factor, y / factor) += share * image.at(x, y);
+  return result;
+}
+
 std::vector<float> relativeErrors(const Image& reference, const Image& image) {
   checkSizes(reference, image);
   std::vector<float> errors(image.pixels.size());

@@ -22,6 +22,9 @@ struct ErrorMetrics {
 /// Throws std::runtime_error when the sizes differ or there are no pixels.
 ErrorMetrics compareImages(const Image& reference, const Image& image);
 
+/// Each pixel the mean of factor × factor pixels. Throws std::runtime_error unless factor ≥ 1 divides both sizes.
+Image averagedDown(const Image& image, int factor);
+
 /// The relative error of each pixel, row by row; NaN where a pixel is not finite. Throws like compareImages.
 std::vector<float> relativeErrors(const Image& reference, const Image& image);
 

@@ -21,6 +21,7 @@ struct Arguments {
   std::vector<std::string> images;
   bool json = false;
   std::string map;
+  int shrink = 1;
 };
 
 struct Comparison {
@@ -36,6 +37,8 @@ void declare(CLI::App& app, Arguments& arguments) {
                  fmt::format("Write the relative error of each pixel of the one image as a PNG, from {:g} (black) over "
                              "blue, red and yellow to {:g} (white)",
                              lobe::kMapLow, lobe::kMapHigh));
+  app.add_option("--shrink", arguments.shrink, "First average the reference over squares of so many pixels a side")
+      ->check(CLI::PositiveNumber);
 }
 
 void checkArguments(const Arguments& arguments) {
@@ -82,9 +85,18 @@ void printTable(const std::vector<Comparison>& comparisons) {
   table.print(stdout);
 }
 
+lobe::Image readReference(const Arguments& arguments) {
+  const lobe::Image reference = lobe::readImage(arguments.reference);
+  try {
+    return lobe::averagedDown(reference, arguments.shrink);
+  } catch (const std::runtime_error& e) {
+    throw std::runtime_error(fmt::format("{}: {}", arguments.reference, e.what()));
+  }
+}
+
 void run(const Arguments& arguments) {
   checkArguments(arguments);
-  const lobe::Image reference = lobe::readImage(arguments.reference);
+  const lobe::Image reference = readReference(arguments);
   std::vector<Comparison> comparisons;
   for (const std::string& name : arguments.images) comparisons.push_back(compare(reference, name, arguments.map));
   if (arguments.json)
