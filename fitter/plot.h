@@ -11,20 +11,14 @@
 #include <vector>
 
 #include "fitter/lobe_fit.h"
-#include "fitter/raster.h"
 #include "materials/lobe.h"
+#include "plots/disc_panel.h"
 #include "schema/lobe_cache.h"
 
 namespace lobe {
 
 inline constexpr double kPlotDecades = 3;
 inline constexpr double kPlotRatio = 10;
-
-/// A square part of the plane of the disc.
-struct PlotView {
-  Vec2 centre{0, 0};
-  float half = 1;  ///< half of its side
-};
 
 struct PlotRow {
   int record;

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "fitter/cache_diff.h"
-#include "fitter/colour_map.h"
+#include "plots/colour_map.h"
 #include "fitter/disc_mass.h"
 #include "fitter/lobe_fit.h"
 #include "fitter/plot.h"

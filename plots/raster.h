@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "fitter/colour_map.h"
+#include "plots/colour_map.h"
 
 namespace lobe {
 

@@ -1,4 +1,4 @@
-#include "fitter/colour_map.h"
+#include "plots/colour_map.h"
 
 #include <algorithm>
 #include <cmath>

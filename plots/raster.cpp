@@ -1,4 +1,4 @@
-#include "fitter/raster.h"
+#include "plots/raster.h"
 
 #include <cmath>
 #include <cstring>
