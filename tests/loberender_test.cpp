@@ -351,3 +351,42 @@ TEST_CASE("loberender: statistics, convergence and pictures of a run") {
     CHECK(number(file.header(), "samples") >= 1);
   }
 }
+
+TEST_CASE("loberender: --record draws the record that a pixel shows") {
+  const SceneFolder folder(false);
+  const std::string guided = "loberender scene.xml -o a.exr --spp 1 --integrator guided" + kTraining;
+  const ToolRun run = folder.run(guided + " --record 8,11 --record-image floor.png");
+  CAPTURE(run.error);
+  REQUIRE(run.code == 0);
+  CHECK_THAT(run.error, Catch::Contains("floor.png: position ") && Catch::Contains("NEV "));
+  const Image image = readImage(folder / "floor.png");
+  CHECK(image.width > 2 * image.height);
+  // Three panels with something in each.
+  for (const int column : {0, 1, 2}) {
+    std::set<float> greens;
+    for (int y = 0; y < image.height; ++y)
+      for (int x = column * image.width / 3; x < (column + 1) * image.width / 3; ++x) greens.insert(image.at(x, y).y());
+    CHECK(greens.size() > 5);
+  }
+  CHECK(folder.run(guided + " --record 8,11").code == 0);
+  CHECK(folder.has("record.png"));
+}
+
+TEST_CASE("loberender: --record says why there is nothing to draw") {
+  const SceneFolder folder(false);
+  const std::string guided = "loberender scene.xml -o a.exr --spp 1 --integrator guided" + kTraining;
+  CHECK_THAT(fault(folder, guided + " --record 16,0", 1),
+             Catch::Contains("--record 16,0: the picture has 16x12 pixels"));
+  CHECK_THAT(fault(folder, guided + " --record=-1,3", 1), Catch::Contains("--record -1,3: the picture has"));
+  CHECK_THAT(fault(folder, guided + " --record 0,0", 1), Catch::Contains("no surface that scatters light"));
+  CHECK_THAT(fault(folder, guided + " --record 3", 2), Catch::Contains("'3' is not X,Y"));
+  CHECK_THAT(fault(folder, guided + " --record 8,11 --record-image a.exr", 2), Catch::Contains("is written as .png"));
+  CHECK_THAT(fault(folder, "loberender scene.xml -o a.exr --spp 1 --integrator path --record 8,11", 2),
+             Catch::Contains("path learns nothing"));
+  // In the light of nothing no record is made.
+  std::string dark = kScene;
+  const std::string radiance = "radiance\" value=\"";
+  dark[dark.find(radiance) + radiance.size()] = '0';
+  folder.write("scene.xml", dark);
+  CHECK_THAT(fault(folder, guided + " --record 8,11", 1), Catch::Contains("no record serves the point"));
+}

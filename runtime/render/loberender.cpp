@@ -12,12 +12,14 @@ namespace {
 
 using namespace lobe;
 
-/// "WxH" to two numbers.
-std::pair<int, int> parseSize(const std::string& text) {
-  int width = 0, height = 0, end = 0;
-  if (std::sscanf(text.c_str(), "%dx%d%n", &width, &height, &end) != 2 || end != static_cast<int>(text.size()))
-    throw UsageError("--size: '" + text + "' is not WIDTHxHEIGHT");
-  return {width, height};
+/// Two numbers with a sign between them, as `form` shows it.
+std::pair<int, int> parsePair(const std::string& option, const std::string& text, char sign, const char* form) {
+  int first = 0, second = 0, end = 0;
+  char between = 0;
+  if (std::sscanf(text.c_str(), "%d%c%d%n", &first, &between, &second, &end) != 3 || between != sign ||
+      end != static_cast<int>(text.size()))
+    throw UsageError(option + ": '" + text + "' is not " + form);
+  return {first, second};
 }
 
 constexpr std::uint64_t kMaxSeed = std::uint64_t{1} << 53;  // a picture's metadata holds it exactly
@@ -29,7 +31,7 @@ const std::map<std::string, TrainFrom> kTrainFromNames{
 
 struct Options {
   RenderJob job;
-  std::string size, integrator = "product";
+  std::string size, record, integrator = "product";
   int threads = 0;
 };
 
@@ -67,6 +69,11 @@ void declare(CLI::App& app, Options& options) {
   app.add_option("--reference", job.reference, "Picture to measure the error against while rendering");
   app.add_option("--convergence", job.convergence, "CSV of that error over time");
   app.add_option("--stats", job.stats, "JSON file for the run's statistics");
+  app.add_option("--record", options.record,
+                 "X,Y: draw the illumination record that serves what this pixel shows (0,0 is top left)");
+  app.add_option("--record-image", job.recordImage,
+                 "PNG for it: mixture, particles of the last pass and incident light over the disc of directions")
+      ->capture_default_str();
   app.add_flag("--lenient", job.lenient, "Pass over what the reader does not know, with warnings");
   declareTraining(app, job);
   addDefinitions(app, job.definitions);
@@ -76,7 +83,8 @@ void declare(CLI::App& app, Options& options) {
 void work(Options& options) {
   const auto name = std::ranges::find(kIntegratorNames, options.integrator);
   options.job.integrator = static_cast<IntegratorKind>(name - kIntegratorNames.begin());
-  if (!options.size.empty()) options.job.size = parseSize(options.size);
+  if (!options.size.empty()) options.job.size = parsePair("--size", options.size, 'x', "WIDTHxHEIGHT");
+  if (!options.record.empty()) options.job.record = parsePair("--record", options.record, ',', "X,Y");
   std::optional<oneapi::tbb::global_control> limit;
   if (options.threads > 0) limit.emplace(oneapi::tbb::global_control::max_allowed_parallelism, options.threads);
   run(options.job);

@@ -20,6 +20,7 @@
 #include "runtime/render/error_metrics.h"
 #include "runtime/render/image_output.h"
 #include "runtime/render/path_integrator.h"
+#include "runtime/render/record_view.h"
 #include "runtime/render/renderer.h"
 #include "scenes/camera.h"
 #include "scenes/reader.h"
@@ -51,6 +52,7 @@ void checkFiles(const RenderJob& job) {
   std::vector<std::filesystem::path> written = job.outputs;
   for (const auto& path : {job.convergence, job.stats})
     if (!path.empty()) written.push_back(path);
+  if (job.record) written.push_back(job.recordImage);
   std::map<std::filesystem::path, int> uses;
   for (const auto& path : {job.scene, job.reference})
     if (!path.empty()) ++uses[std::filesystem::weakly_canonical(path)];
@@ -208,11 +210,32 @@ void prepare(const RenderJob& job, const RenderScene& scene, const RayCamera& ca
   if (job.integrator == IntegratorKind::path) return;
   TrainingPlan plan = job.training;
   plan.seed = job.seed;
+  plan.keepParticles = job.record.has_value();
   if (job.seconds) plan.seconds = job.trainingShare * *job.seconds;
   const BrdfCaches* caches = guiding.caches ? &*guiding.caches : nullptr;
   Progress progress("training", plan.passes);
   guiding.training = trainIllumination(scene, camera, caches, plan, [&](int) { progress.advance(); });
   guiding.sampler.emplace(scene.scene, guiding.training.cache, caches);
+}
+
+/// What --record asks for; its faults get the option's name.
+template <class Work>
+auto forRecord(const RenderJob& job, const Work& work) {
+  try {
+    return work();
+  } catch (const NoRecord& e) {
+    throw std::runtime_error(fmt::format("--record {},{}: {}", job.record->first, job.record->second, e.what()));
+  }
+}
+
+void drawRecord(const RenderJob& job, const RenderScene& scene, const Receiver& receiver,
+                TrainedIllumination& training) {
+  const RecordView view = forRecord(job, [&] { return viewRecord(scene, receiver, training, job.training.records); });
+  view.raster.write(job.recordImage);
+  std::string line = view.caption;
+  std::ranges::replace(line, '\n', ' ');
+  printNote(kTool, fmt::format("{}: {}", job.recordImage.string(), line));
+  training.particles = {};  // drawn: rendering needs the memory more
 }
 
 std::unique_ptr<Integrator> makeIntegrator(const RenderJob& job, const RenderScene& scene, const Guiding& guiding) {
@@ -255,6 +278,8 @@ void RenderJob::validate() const {
   require(trainingShare > 0 && trainingShare < 1, "--training-share has to be between 0 and 1");
   require(reference.empty() == convergence.empty(), "--reference and --convergence go together");
   require(!outputs.empty(), "-o is missing");
+  require(!record || integrator != IntegratorKind::path, "--record is for guided and product: path learns nothing");
+  require(recordImage.extension() == ".png", "--record-image is written as .png");
   try {
     training.validate();
     for (const auto& output : outputs) checkImageName(output);
@@ -286,7 +311,11 @@ void run(const RenderJob& job) {
   load.building = building.seconds();
   load.embree = renderScene.tracer.buildSeconds();
   const RayCamera camera(scene.camera, scene.filter);
+  std::optional<Receiver> receiver;
+  if (job.record)
+    receiver = forRecord(job, [&] { return receiverAt(renderScene, camera, job.record->first, job.record->second); });
   prepare(job, renderScene, camera, guiding);
+  if (receiver) drawRecord(job, renderScene, *receiver, guiding.training);
 
   const std::unique_ptr<Integrator> integrator = makeIntegrator(job, renderScene, guiding);
   Film film(camera.width(), camera.height());

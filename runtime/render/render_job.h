@@ -33,6 +33,9 @@ struct RenderJob {
 
   std::filesystem::path reference, convergence, stats;  ///< empty: not wanted
 
+  std::optional<std::pair<int, int>> record;         ///< the pixel whose record is drawn
+  std::filesystem::path recordImage = "record.png";  ///< into this file
+
   /// Throws UsageError that names the option.
   void validate() const;
 };

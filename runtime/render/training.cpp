@@ -58,6 +58,7 @@ class Training {
   void finish(int passes) { radiance_.fill(sources(), tracer_->traceImportons(passes, plan_.importons, {}).requests); }
 
   const IlluminationTrainer& radiance() const { return radiance_; }
+  std::array<std::vector<Particle>, 2> takeParticles() { return {std::move(photons_), std::move(samples_)}; }
 
  private:
   std::array<std::span<const Particle>, 2> sources() const { return {photons_, samples_}; }
@@ -106,7 +107,9 @@ TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera&
   training.finish(passes);
   report.seconds = watch.seconds();
   report.undersampledShare = training.radiance().undersampledShare();
-  return {training.radiance().cache(), report};
+  TrainedIllumination trained{training.radiance().cache(), report, {}};
+  if (plan.keepParticles) trained.particles = training.takeParticles();
+  return trained;
 }
 
 }  // namespace lobe

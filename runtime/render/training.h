@@ -1,6 +1,7 @@
 #pragma once
 // Trains the illumination of a scene, pass by pass.
 
+#include <array>
 #include <functional>
 #include <vector>
 
@@ -19,6 +20,7 @@ struct TrainingPlan {
   int importons = 100000;      ///< a pass
   double seconds = kInfinity;  ///< no pass starts after that; the result then depends on the machine's speed
   std::uint64_t seed = 1;
+  bool keepParticles = false;  ///< of the last pass, for TrainedIllumination::particles
   TrainingOptions records;
 
   /// Throws std::runtime_error that names the field.
@@ -44,6 +46,8 @@ struct TrainingReport {
 struct TrainedIllumination {
   IlluminationCache cache;
   TrainingReport report;
+  /// Where kept: photons, and samples of camera paths. Their weights are of different scales.
+  std::array<std::vector<Particle>, 2> particles;
 };
 
 /// caches: for the product; nullptr: paths in training are guided by illumination only. afterPass: passes done so far.
