@@ -34,7 +34,7 @@ class Histogram {
  private:
   static std::size_t index(const Vec2& y) {
     const auto cell = [](float v) { return std::clamp(static_cast<int>(0.5f * (v + 1) * kCells), 0, kCells - 1); };
-    return static_cast<std::size_t>(cell(y.y()) * kCells + cell(y.x()));
+    return static_cast<std::size_t>(cell(y.y())) * kCells + static_cast<std::size_t>(cell(y.x()));
   }
   std::array<double, static_cast<std::size_t>(kCells) * kCells> cells_{};
   double total_ = 0;
