@@ -179,6 +179,9 @@ void declare(CLI::App& app, Options& o) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   app.add_option("--receivers", o.receivers, "Places where to look")->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--train", o.plan.from, "What records learn from")
+      ->transform(CLI::CheckedTransformer(trainFromNames()))
+      ->default_str("both");
   app.add_option("--photons", o.plan.photons, "Photons a pass")->capture_default_str();
   app.add_option("--importons", o.plan.importons, "Importons a pass")->capture_default_str();
   app.add_option("--components", o.plan.records.components, "Gaussians of a record")->capture_default_str();

@@ -26,9 +26,6 @@ constexpr std::uint64_t kMaxSeed = std::uint64_t{1} << 53;  // a picture's metad
 
 const std::vector<std::string> kIntegratorNames{"path", "guided", "product"};  // in the order of IntegratorKind
 
-const std::map<std::string, TrainFrom> kTrainFromNames{
-    {"photons", TrainFrom::photons}, {"paths", TrainFrom::paths}, {"both", TrainFrom::both}};
-
 struct Options {
   RenderJob job;
   std::string size, record, integrator = "product";
@@ -38,7 +35,7 @@ struct Options {
 void declareTraining(CLI::App& app, RenderJob& job) {
   TrainingPlan& plan = job.training;
   app.add_option("--train", plan.from, "What records learn from: photons, paths (of the camera) or both")
-      ->transform(CLI::CheckedTransformer(kTrainFromNames))
+      ->transform(CLI::CheckedTransformer(trainFromNames()))
       ->default_str("both");
   app.add_option("--passes", plan.passes, "Training passes")->capture_default_str();
   app.add_option("--photons", plan.photons, "Photons a pass")->capture_default_str();

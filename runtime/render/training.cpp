@@ -74,6 +74,10 @@ class Training {
 
 }  // namespace
 
+std::map<std::string, TrainFrom> trainFromNames() {
+  return {{"photons", TrainFrom::photons}, {"paths", TrainFrom::paths}, {"both", TrainFrom::both}};
+}
+
 void TrainingPlan::validate() const {
   const auto require = [](bool condition, const char* message) {
     if (!condition) throw std::runtime_error(message);

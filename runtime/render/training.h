@@ -3,6 +3,8 @@
 
 #include <array>
 #include <functional>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "runtime/guiding/illumination_trainer.h"
@@ -12,6 +14,8 @@ namespace lobe {
 
 /// What records learn from.
 enum class TrainFrom { photons, paths, both };
+/// As the tools' options spell them.
+std::map<std::string, TrainFrom> trainFromNames();
 
 struct TrainingPlan {
   TrainFrom from = TrainFrom::both;
