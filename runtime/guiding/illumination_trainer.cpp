@@ -139,7 +139,6 @@ void IlluminationTrainer::makeRecords(const ParticleNeighbours& neighbours, std:
       if (made[i]) records_.push_back(std::move(*made[i]));
     }
   }
-  limitRadii();
   rebuildCache();
 }
 
@@ -169,22 +168,6 @@ void IlluminationTrainer::shrinkRadius(Training& record) const {
   const auto parallax = static_cast<float>(record.distance / inverse);
   const float allowed = std::max({parallax, 0.5f * record.radius, 0.1f * unit_});
   record.radius = std::min(record.radius, allowed);
-}
-
-// No record is valid farther out than its neighbours allow: R_i ≤ R_j + |x_i − x_j|. Light that changes fast around one
-// record does so for those beside it.
-void IlluminationTrainer::limitRadii() {
-  PointGrid<float> grid(unit_);
-  for (const Training& r : records_) grid.add(r.position, r.normal, r.radius);
-  tbb::parallel_for(std::size_t{0}, records_.size(), [&](std::size_t i) {
-    Training& record = records_[i];
-    float limit = record.radius;
-    grid.any(record.position, record.normal, [&](float d2, float radius) {
-      limit = std::min(limit, radius + std::sqrt(d2));
-      return false;
-    });
-    record.radius = std::max(limit, 0.1f * unit_);
-  });
 }
 
 void IlluminationTrainer::rebuildCache() {

@@ -59,7 +59,6 @@ class IlluminationTrainer {
   void makeRecords(const ParticleNeighbours& neighbours, std::span<const RecordRequest> requests);
   std::optional<Training> makeRecord(const ParticleNeighbours& neighbours, const RecordRequest& request) const;
   void shrinkRadius(Training& record) const;
-  void limitRadii();
   void rebuildCache();
 
   TrainingOptions options_;

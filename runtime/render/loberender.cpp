@@ -37,13 +37,13 @@ void declareTraining(CLI::App& app, RenderJob& job) {
   app.add_option("--train", plan.from, "What records learn from: photons, paths (of the camera) or both")
       ->transform(CLI::CheckedTransformer(trainFromNames()))
       ->default_str("both");
-  app.add_option("--passes", plan.passes, "Training passes")->capture_default_str();
+  app.add_option("--passes", job.passes, "Training passes (default: 8, or as many as fit into the training's seconds)");
   app.add_option("--photons", plan.photons, "Photons a pass")->capture_default_str();
   app.add_option("--importons", plan.importons, "Importons a pass")->capture_default_str();
   app.add_option("--components", plan.records.components, "Gaussians of an illumination record, 1 to 8")
       ->capture_default_str();
-  app.add_option("--training-share", job.trainingShare, "With --seconds: the share of them after which no pass starts")
-      ->capture_default_str();
+  app.add_option("--train-seconds", job.trainSeconds,
+                 "No training pass starts after that (default: three tenths of --seconds; with --spp no limit)");
 }
 
 void declare(CLI::App& app, Options& options) {

@@ -31,6 +31,7 @@ namespace lobe {
 namespace {
 
 constexpr const char* kTool = "loberender";
+constexpr double kTrainingShare = 0.3;        // of --seconds
 constexpr std::int64_t kMaxPixels = 1 << 28;  // a film of more is a slip of the finger
 
 const char* nameOf(IntegratorKind kind) {
@@ -211,10 +212,15 @@ void prepare(const RenderJob& job, const RenderScene& scene, const RayCamera& ca
   TrainingPlan plan = job.training;
   plan.seed = job.seed;
   plan.keepParticles = job.record.has_value();
-  if (job.seconds) plan.seconds = job.trainingShare * *job.seconds;
+  plan.seconds = job.trainSeconds.value_or(job.seconds ? kTrainingShare * *job.seconds : kInfinity);
+  // Only time limits the passes where there is no other reason to stop.
+  plan.passes = job.passes.value_or(plan.seconds < kInfinity ? std::numeric_limits<int>::max() : plan.passes);
   const BrdfCaches* caches = guiding.caches ? &*guiding.caches : nullptr;
-  Progress progress("training", plan.passes);
-  guiding.training = trainIllumination(scene, camera, caches, plan, [&](int) { progress.advance(); });
+  const bool timed = plan.seconds < kInfinity;
+  Progress progress("training", timed ? plan.seconds : plan.passes);
+  guiding.training = trainIllumination(scene, camera, caches, plan, [&](const PassReport& pass) {
+    progress.advance(timed ? pass.seconds : 1.0);
+  });
   guiding.sampler.emplace(scene.scene, guiding.training.cache, caches);
 }
 
@@ -275,7 +281,9 @@ void RenderJob::validate() const {
   require(!size || (size->first >= 1 && size->second >= 1 && std::int64_t{size->first} * size->second <= kMaxPixels),
           fmt::format("--size has to be at least 1x1 and at most {} pixels", kMaxPixels));
   require(!maxDepth || *maxDepth >= 1, "--max-depth has to be at least 1");
-  require(trainingShare > 0 && trainingShare < 1, "--training-share has to be between 0 and 1");
+  require(!trainSeconds || (*trainSeconds > 0 && std::isfinite(*trainSeconds)), "--train-seconds has to be over 0");
+  require(!trainSeconds || !seconds || *trainSeconds < *seconds, "--train-seconds has to be less than --seconds");
+  require(!passes || *passes >= 1, "--passes has to be at least 1");
   require(reference.empty() == convergence.empty(), "--reference and --convergence go together");
   require(!outputs.empty(), "-o is missing");
   require(!record || integrator != IntegratorKind::path, "--record is for guided and product: path learns nothing");

@@ -29,7 +29,8 @@ struct RenderJob {
   std::optional<int> maxDepth;  ///< segments
   std::uint64_t seed = 1;
   TrainingPlan training;
-  double trainingShare = 0.3;  ///< of seconds, at most
+  std::optional<int> passes;           ///< of training; by default the plan's, or without limit where time is one
+  std::optional<double> trainSeconds;  ///< no pass starts after that; by default a share of seconds, else no limit
 
   std::filesystem::path reference, convergence, stats;  ///< empty: not wanted
 

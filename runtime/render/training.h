@@ -54,8 +54,8 @@ struct TrainedIllumination {
   std::array<std::vector<Particle>, 2> particles;
 };
 
-/// caches: for the product; nullptr: paths in training are guided by illumination only. afterPass: passes done so far.
+/// caches: for the product; nullptr: paths in training are guided by illumination only. afterPass: called with what each pass did.
 TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera& camera, const BrdfCaches* caches,
-                                      const TrainingPlan& plan, const std::function<void(int)>& afterPass = {});
+                                      const TrainingPlan& plan, const std::function<void(const PassReport&)>& afterPass = {});
 
 }  // namespace lobe
