@@ -12,7 +12,7 @@
 
 #include "fitter/lobe_fit.h"
 #include "materials/lobe.h"
-#include "plots/disc_panel.h"
+#include "runtime/plots/disc_panel.h"
 #include "schema/lobe_cache.h"
 
 namespace lobe {

@@ -7,12 +7,12 @@
 #include <nlohmann/json.hpp>
 
 #include "fitter/cache_diff.h"
-#include "plots/colour_map.h"
 #include "fitter/disc_mass.h"
 #include "fitter/lobe_fit.h"
 #include "fitter/plot.h"
 #include "materials/image.h"
 #include "runtime/mixture/grid.h"
+#include "runtime/plots/colour_map.h"
 #include "schema/atomic_file.h"
 #include "tests/fitter_test_lobes.h"
 #include "tests/tool_run.h"

@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
-#include "plots/disc_panel.h"
-#include "plots/text.h"
+#include "runtime/plots/disc_panel.h"
+#include "runtime/plots/text.h"
 #include "runtime/render/guided_integrator.h"
 
 namespace lobe {

@@ -13,8 +13,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "plots/raster.h"
 #include "runtime/guiding/particle_neighbours.h"
+#include "runtime/plots/raster.h"
 #include "runtime/render/received_light.h"
 #include "runtime/render/training.h"
 

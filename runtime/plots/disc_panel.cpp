@@ -1,4 +1,4 @@
-#include "plots/disc_panel.h"
+#include "runtime/plots/disc_panel.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,8 +5,8 @@
 #include <functional>
 #include <span>
 
-#include "plots/raster.h"
 #include "runtime/mixture/gaussian.h"
+#include "runtime/plots/raster.h"
 
 namespace lobe {
 

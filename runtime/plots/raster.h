@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "plots/colour_map.h"
+#include "runtime/plots/colour_map.h"
 
 namespace lobe {
 

@@ -1,4 +1,4 @@
-#include "plots/text.h"
+#include "runtime/plots/text.h"
 
 #include <cctype>
 #include <cstdint>

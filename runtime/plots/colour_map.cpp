@@ -1,4 +1,4 @@
-#include "plots/colour_map.h"
+#include "runtime/plots/colour_map.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 
 #include <string_view>
 
-#include "plots/raster.h"
+#include "runtime/plots/raster.h"
 
 namespace lobe {
 

@@ -1,4 +1,4 @@
-#include "plots/raster.h"
+#include "runtime/plots/raster.h"
 
 #include <cmath>
 #include <cstring>
