@@ -27,11 +27,8 @@ constexpr std::uint32_t kDecisionShare = 4;
 constexpr double kNarrow = 0.004;
 constexpr std::uint32_t kNarrowRecords = 8;
 
-double worse(double nev, double coverage) {
-  return std::max(nev, coverage);
-}
-double secondMoment(const CacheRecord& record) {
-  return 1 + worse(record.nev, record.nevCoverage);
+double secondMoment(const FittedRecord& fitted) {
+  return 1.0 + fitted.worse();
 }
 
 /// The standard deviation of the lobe across its narrower axis, for the direction of the normal.
@@ -77,35 +74,65 @@ std::vector<int> entriesOf(const Lobe& lobe, const DirectionGrid& grid) {
   return ordered;
 }
 
-bool goodEnough(const FittedRecord& fitted, const FitSettings& settings) {
-  return secondMoment(fitted.record) <= 1.0 + settings.quality;
-}
-
-FittedRecord refined(const Lobe& lobe, const Vec3& wo, FitSettings settings, std::span<const Gaussian> start) {
-  settings.method = kMethodCeres;
-  return fitLobe(lobe, wo, settings, start);
-}
-
-/// By weighted EM; by least squares from there where that is not good enough.
-FittedRecord fitWith(const Lobe& lobe, const Vec3& wo, std::uint32_t components, FitSettings settings) {
-  settings.method = kMethodWem;
-  settings.components = components;
-  FittedRecord fitted = fitLobe(lobe, wo, settings);
-  return goodEnough(fitted, settings) ? fitted : refined(lobe, wo, settings, fitted.mixture);
-}
-
-/// Tries `first` and more components until they are good enough, and keeps more only if worth it.
-FittedRecord fitWithMore(const Lobe& lobe, const Vec3& wo, const FitSettings& settings, FittedRecord best,
-                         std::uint32_t first) {
-  for (const std::uint32_t size : kSizes) {
-    if (goodEnough(best, settings)) break;
-    if (size < first || size > settings.components) continue;
-    FittedRecord fitted = fitWith(lobe, wo, size, settings);
-    const double gain = 1 - secondMoment(fitted.record) / secondMoment(best.record);
-    if (gain > kWorthwhile * settings.quality) best = std::move(fitted);
+/// The fits of one direction, and what is good enough there.
+class DirectionFits {
+ public:
+  DirectionFits(const Lobe& lobe, const Vec3& wo, const FitSettings& settings)
+      : fitter_(lobe, wo, settings.samples), settings_(settings), most_(byWeightedEm(settings.components)) {
+    const float factor = std::max(1.0f, settings.quality / kDefaultQuality);
+    settings_.quality = std::min(settings.quality, factor * most_.worse());
   }
-  return best;
-}
+
+  double target() const { return settings_.quality; }
+
+  FittedRecord fewest() const { return more(with(1), 2); }
+
+  /// From a neighbour's mixture, which keeps its number of components where that is enough.
+  FittedRecord from(std::span<const Gaussian> start) const {
+    FittedRecord fitted = refined(start);
+    // With as many components again: a start from far away may lead nowhere.
+    const std::uint32_t first = fitted.record.count;
+    return more(std::move(fitted), first);
+  }
+
+ private:
+  bool goodEnough(const FittedRecord& fitted) const { return secondMoment(fitted) <= 1.0 + settings_.quality; }
+
+  FittedRecord byWeightedEm(std::uint32_t components) const {
+    FitSettings settings = settings_;
+    settings.method = kMethodWem;
+    settings.components = components;
+    return fitter_.fit(settings);
+  }
+
+  FittedRecord refined(std::span<const Gaussian> start) const {
+    FitSettings settings = settings_;
+    settings.method = kMethodCeres;
+    return fitter_.fit(settings, start);
+  }
+
+  /// By weighted EM; by least squares from there where that is not good enough.
+  FittedRecord with(std::uint32_t components) const {
+    FittedRecord fitted = components == settings_.components ? most_ : byWeightedEm(components);
+    return goodEnough(fitted) ? fitted : refined(fitted.mixture);
+  }
+
+  /// Tries `first` and more components until they are good enough, and keeps more only if worth it.
+  FittedRecord more(FittedRecord best, std::uint32_t first) const {
+    for (const std::uint32_t size : kSizes) {
+      if (goodEnough(best)) break;
+      if (size < first || size > settings_.components) continue;
+      FittedRecord fitted = with(size);
+      const double gain = 1 - secondMoment(fitted) / secondMoment(best);
+      if (gain > kWorthwhile * settings_.quality) best = std::move(fitted);
+    }
+    return best;
+  }
+
+  DirectionFitter fitter_;
+  FitSettings settings_;
+  FittedRecord most_;  // as many components as there may be, by weighted EM
+};
 
 class AdaptiveFitter {
  public:
@@ -117,13 +144,13 @@ class AdaptiveFitter {
     const std::vector<int> entries = entriesOf(lobe_, grid_);
     for (std::size_t begin = 0; begin < entries.size();) {
       const std::size_t end = std::min(entries.size(), std::max<std::size_t>(1, 2 * begin));
-      std::vector<std::optional<FittedRecord>> fitted(end - begin);
+      std::vector<std::optional<Fit>> fitted(end - begin);
       tbb::parallel_for(begin, end, [&](std::size_t i) {
         fitted[i - begin] = fitWhereNeeded(entries[i]);
         if (advance) advance();
       });
       for (std::size_t i = begin; i < end; ++i)
-        if (fitted[i - begin]) add(entries[i], std::move(*fitted[i - begin]));
+        if (fitted[i - begin]) add(entries[i], std::move(fitted[i - begin]->record), fitted[i - begin]->target);
       begin = end;
     }
   }
@@ -131,7 +158,7 @@ class AdaptiveFitter {
   void leaveToBsdf(const std::function<void()>& advance) {
     const std::vector<int> entries = entriesOf(lobe_, grid_);
     for (std::size_t i = 0; i < entries.size(); ++i) {
-      if (i < kNarrowRecords) add(entries[i], withoutComponents(entries[i]));
+      if (i < kNarrowRecords) add(entries[i], withoutComponents(entries[i]), 0);
       if (advance) advance();
     }
   }
@@ -145,6 +172,11 @@ class AdaptiveFitter {
   }
 
  private:
+  struct Fit {
+    FittedRecord record;
+    double target;
+  };
+
   std::uint32_t nearestRecord(const Vec3& wo) const {
     const Vec2 y = toDisc(usesQuarter(lobe_, grid_) ? Mirror::intoQuadrant(wo)(wo) : wo);
     const auto nearest =
@@ -152,30 +184,25 @@ class AdaptiveFitter {
     return static_cast<std::uint32_t>(nearest - references_.begin());
   }
 
-  std::optional<FittedRecord> fitWhereNeeded(int entry) const {
+  std::optional<Fit> fitWhereNeeded(int entry) const {
     const Vec3 wo = grid_.direction(entry);
-    if (records_.empty()) return fitWithFewest(lobe_, wo, settings_);
+    if (records_.empty()) {
+      const DirectionFits fits(lobe_, wo, settings_);
+      return Fit{fits.fewest(), fits.target()};
+    }
     const std::uint32_t found = nearestRecord(wo);
     const FittedRecord& neighbour = records_[found];
     Mixture aligned(neighbour.mixture.size());
     alignMixture({grid_.kind, references_[found], {}}, neighbour.mixture, wo, aligned);
     const Quality served = gradeMixture(lobe_, wo, aligned, settings_.samples / kDecisionShare);
-    const double moment = 1 + worse(served.nev, served.coverage);
+    const double moment = 1 + served.worse();
     // A look-up may be worse than a fit for the direction itself by as much as a fit may be worse than the lobe.
-    const double slack = 1.0 + settings_.quality;
-    if (moment <= slack * secondMoment(neighbour.record)) return std::nullopt;
-    FittedRecord fitted = fitNear(wo, aligned);
+    if (moment <= (1 + targets_[found]) * secondMoment(neighbour)) return std::nullopt;
+    const DirectionFits fits(lobe_, wo, settings_);
+    FittedRecord fitted = fits.from(aligned);
     // Where the lobe itself is hard to fit, another record would not help.
-    if (moment <= slack * secondMoment(fitted.record)) return std::nullopt;
-    return fitted;
-  }
-
-  FittedRecord fitNear(const Vec3& wo, const Mixture& start) const {
-    FittedRecord fitted = refined(lobe_, wo, settings_, start);
-    if (goodEnough(fitted, settings_)) return fitted;
-    // With as many components again: a start from far away may lead nowhere.
-    const std::uint32_t first = fitted.record.count;
-    return fitWithMore(lobe_, wo, settings_, std::move(fitted), first);
+    if (moment <= (1 + fits.target()) * secondMoment(fitted)) return std::nullopt;
+    return Fit{std::move(fitted), fits.target()};
   }
 
   FittedRecord withoutComponents(int entry) const {
@@ -187,10 +214,11 @@ class AdaptiveFitter {
     return fitted;
   }
 
-  void add(int entry, FittedRecord fitted) {
+  void add(int entry, FittedRecord fitted, double target) {
     fitted.record.entry = static_cast<std::uint32_t>(entry);
     references_.push_back(toDisc(grid_.direction(entry)));
     records_.push_back(std::move(fitted));
+    targets_.push_back(target);
   }
 
   const Lobe& lobe_;
@@ -198,12 +226,13 @@ class AdaptiveFitter {
   const FitSettings& settings_;
   std::vector<FittedRecord> records_;
   std::vector<Vec2> references_;  // of the records
+  std::vector<double> targets_;   // what was good enough for them
 };
 
 }  // namespace
 
 FittedRecord fitWithFewest(const Lobe& lobe, const Vec3& wo, const FitSettings& settings) {
-  return fitWithMore(lobe, wo, settings, fitWith(lobe, wo, 1, settings), 2);
+  return DirectionFits(lobe, wo, settings).fewest();
 }
 
 int adaptiveDirections(const Lobe& lobe, const DirectionGrid& grid) {

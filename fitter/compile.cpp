@@ -114,29 +114,49 @@ std::vector<std::vector<int>> chainsOf(const DirectionGrid& grid, const FitSetti
   return chains;
 }
 
-FittedRecord fitFromNeighbour(const Lobe& lobe, const DirectionGrid& grid, int entry, int neighbour,
-                              const FittedRecord& fitted, const FitSettings& settings) {
-  const Vec3 wo = grid.direction(entry);
-  Mixture start(fitted.mixture.size());
-  alignMixture({grid.kind, toDisc(grid.direction(neighbour)), {}}, fitted.mixture, wo, start);
-  FittedRecord record = fitLobe(lobe, wo, settings, start);
-  if (record.record.nevCoverage <= kWorseByFactor * fitted.record.nevCoverage + kWorseBy) return record;
-  FittedRecord fresh = fitLobe(lobe, wo, settings);
-  return fresh.record.nevCoverage < record.record.nevCoverage ? fresh : record;
+/// Least squares for the product may end in a worse place than weighted EM that has converged; then they start from
+/// there, and are no worse.
+FittedRecord notAboveWeightedEm(const DirectionFitter& fitter, const FitSettings& settings, FittedRecord found) {
+  if (settings.method != kMethodCeres) return found;
+  FitSettings wem = settings;
+  wem.method = kMethodWem;
+  const FittedRecord reached = fitter.fit(wem);
+  return found.worse() <= reached.worse() ? found : fitter.fit(settings, reached.mixture);
 }
 
-/// A chain of directions; with method auto every record chooses its components for itself.
+/// A record of a chain and the direction it was fitted for.
+struct Neighbour {
+  const FittedRecord& fitted;
+  Vec3 wo;
+};
+
+FittedRecord fitFromNeighbour(const DirectionFitter& fitter, const Vec3& wo, GridKind kind, const Neighbour& neighbour,
+                              const FitSettings& settings) {
+  Mixture start(neighbour.fitted.mixture.size());
+  alignMixture({kind, toDisc(neighbour.wo), {}}, neighbour.fitted.mixture, wo, start);
+  FittedRecord record = fitter.fit(settings, start);
+  if (record.record.nevCoverage <= kWorseByFactor * neighbour.fitted.record.nevCoverage + kWorseBy) return record;
+  FittedRecord fresh = fitter.fit(settings);
+  return fresh.worse() < record.worse() ? fresh : record;
+}
+
+FittedRecord fitOfChain(const Lobe& lobe, const Vec3& wo, GridKind kind, const std::optional<Neighbour>& neighbour,
+                        const FitSettings& settings) {
+  // Every record chooses its components for itself.
+  if (settings.method == kMethodAuto) return fitWithFewest(lobe, wo, settings);
+  const DirectionFitter fitter(lobe, wo, settings.samples);
+  return notAboveWeightedEm(
+      fitter, settings, neighbour ? fitFromNeighbour(fitter, wo, kind, *neighbour, settings) : fitter.fit(settings));
+}
+
 void fitChain(const Lobe& lobe, const DirectionGrid& grid, const std::vector<int>& chain, const FitSettings& settings,
               std::vector<FittedRecord>& fitted, const std::function<void()>& advance) {
-  for (std::size_t j = 0; j < chain.size(); ++j) {
-    FittedRecord& record = fitted[static_cast<std::size_t>(chain[j])];
-    if (settings.method == kMethodAuto)
-      record = fitWithFewest(lobe, grid.direction(chain[j]), settings);
-    else if (j == 0)
-      record = fitLobe(lobe, grid.direction(chain[j]), settings);
-    else
-      record = fitFromNeighbour(lobe, grid, chain[j], chain[j - 1], fitted[static_cast<std::size_t>(chain[j - 1])],
-                                settings);
+  std::optional<Neighbour> neighbour;
+  for (const int entry : chain) {
+    const Vec3 wo = grid.direction(entry);
+    FittedRecord& record = fitted[static_cast<std::size_t>(entry)];
+    record = fitOfChain(lobe, wo, grid.kind, neighbour, settings);
+    neighbour.emplace(record, wo);
     if (advance) advance();
   }
 }
@@ -160,7 +180,7 @@ FittedGrid fitEveryEntry(const Lobe& lobe, const DirectionGrid& grid, const FitS
 FitSettings defaultFitSettings() {
   FitSettings settings;
   settings.method = kMethodAuto;
-  settings.quality = 0.03f;
+  settings.quality = kDefaultQuality;
   return settings;
 }
 

@@ -21,6 +21,9 @@ struct Point {
 
 constexpr double kStartShare = 0.5;
 
+constexpr std::uint32_t kCoarseShare = 4;
+constexpr double kCoarseTolerance = 10;
+
 std::vector<Point> ownPoints(const Lobe& lobe, const Vec3& wo, std::uint32_t count) {
   std::vector<Point> points;
   for (const LobeDraw& d : drawLobe(lobe, wo, 0, count))
@@ -102,8 +105,11 @@ FitPoints fitPoints(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> 
   return asArrays(points, true);
 }
 
-NonlinearFit refineMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> start,
-                           const NonlinearFitOptions& options) {
+namespace {
+
+/// Levenberg–Marquardt on points drawn for this start.
+NonlinearFit solved(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> start,
+                    const NonlinearFitOptions& options) {
   NonlinearFit fit{{start.begin(), start.end()}};
   const FitPoints points = fitPoints(lobe, wo, start, options);
   const FitResiduals residuals(options.objective, points, start.size());
@@ -121,6 +127,21 @@ NonlinearFit refineMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gau
       toMixture(fromParameters({parameters.data(), static_cast<std::size_t>(parameters.size())}, points.whitening),
                 points.whitening);
   return fit;
+}
+
+}  // namespace
+
+NonlinearFit refineMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> start,
+                           const NonlinearFitOptions& options) {
+  // Most of the way is as well gone on few points.
+  NonlinearFitOptions coarse = options;
+  coarse.points /= kCoarseShare;
+  coarse.tolerance *= kCoarseTolerance;
+  const NonlinearFit first = solved(lobe, wo, start, coarse);
+  NonlinearFit second = solved(lobe, wo, first.mixture, options);
+  second.iterations += first.iterations;
+  if (first.iterations > 0) second.startCost = first.startCost;
+  return second;
 }
 
 }  // namespace lobe

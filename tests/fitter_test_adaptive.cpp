@@ -29,7 +29,7 @@ TEST_CASE("fitter: directions between the records are served as well as asked fo
   const LobePtr lobe = conductorLobe(alpha, alpha);
   const DirectionGrid grid{GridKind::elevation, 64};
   const FittedGrid fit = fitAdaptively(*lobe, grid, settings);
-  CHECK(fit.records.size() <= 24);
+  CHECK(fit.records.size() <= 32);
   CHECK(meanComponents(fit) <= 6);
   for (const double elevation : {0.0, 7.0, 21.0, 33.0, 48.0, 62.0, 75.0, 84.0, 88.0}) {
     CAPTURE(alpha, elevation);
@@ -45,6 +45,26 @@ TEST_CASE("fitter: less quality needs less") {
   settings.quality = 0.3f;
   const FittedGrid coarse = fitAdaptively(*lobe, grid, settings);
   CHECK(coarse.components.size() < fine.components.size() / 2);
+}
+
+TEST_CASE("fitter: by default records are as good as weighted EM with eight components") {
+  FitSettings settings = defaultFitSettings(), wem = settings;
+  settings.reduction = wem.reduction = 0;
+  wem.method = kMethodWem;
+  std::size_t components = 0, records = 0;
+  for (const auto& [distribution, alpha] :
+       {std::pair("ggx", 0.05), std::pair("beckmann", 0.1), std::pair("beckmann", 0.3)}) {
+    const LobePtr lobe = conductorLobe(alpha, alpha, distribution);
+    for (const double elevation : {10.0, 40.0, 65.0, 80.0}) {
+      CAPTURE(distribution, alpha, elevation);
+      const FittedRecord fewest = fitWithFewest(*lobe, direction(elevation), settings);
+      // More Gaussians have to be worth a quarter of that.
+      CHECK(fewest.worse() <= 1.25f * fitLobe(*lobe, direction(elevation), wem).worse());
+      CHECK(fewest.worse() <= 1.25f * settings.quality);
+      components += fewest.mixture.size(), ++records;
+    }
+  }
+  CHECK(components <= 5 * records);
 }
 
 TEST_CASE("fitter: an anisotropic lobe is fitted for a quarter of the directions and served for all") {

@@ -292,6 +292,22 @@ TEST_CASE("fitter: grids are fitted along chains, elevations and Fibonacci point
   }
 }
 
+TEST_CASE("fitter: over a grid, least squares are nowhere worse than weighted EM") {
+  const DirectionGrid grid{GridKind::elevation, 12};
+  for (const char* distribution : {"ggx", "beckmann"}) {
+    for (const double alpha : {0.02, 0.05, 0.1, 0.2, 0.3, 0.5}) {
+      const LobePtr lobe = conductorLobe(alpha, alpha, distribution);
+      const FittedGrid wem = fitGrid(*lobe, grid, settingsFor("wem", 8, 512));
+      const FittedGrid fit = fitGrid(*lobe, grid, settingsFor("ceres", 8, 512));
+      for (std::size_t i = 0; i < fit.records.size(); ++i) {
+        const CacheRecord &a = fit.records[i], &b = wem.records[i];
+        CAPTURE(distribution, alpha, i);
+        CHECK(std::max(a.nev, a.nevCoverage) <= std::max(b.nev, b.nevCoverage));
+      }
+    }
+  }
+}
+
 TEST_CASE("fitter: methods that do not exist are named") {
   CHECK_THROWS_WITH(fitLobe(*conductorLobe(0.2, 0.2), direction(10), settingsFor("magic")),
                     Catch::Contains("wem, ceres or eq8, not 'magic'"));
