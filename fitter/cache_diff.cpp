@@ -58,8 +58,9 @@ bool sameRecord(const LobeCache& a, const LobeCache& b, const RecordPair& pair) 
   return sameMixture && sameBytes(std::span<const CacheRecord>(&first, 1), std::span<const CacheRecord>(&second, 1));
 }
 
-void countQuality(CacheDifference& d, double nevA, double nevB) {
-  const double change = (1 + nevB) / (1 + nevA) - 1;
+void countQuality(CacheDifference& d, const CacheRecord& a, const CacheRecord& b) {
+  if (!graded(a) || !graded(b)) return;
+  const double change = (1.0 + b.nev) / (1.0 + a.nev) - 1;
   if (std::abs(change) <= kAlike)
     ++d.alike;
   else
@@ -70,10 +71,10 @@ Json recordJson(const LobeCache& cache, int index) {
   const CacheRecord& r = recordOf(cache, index);
   return {{"record", index},
           {"components", r.count},
-          {"nev", shortNumber(r.nev)},
-          {"nev_coverage", shortNumber(r.nevCoverage)},
-          {"worst_ratio", shortNumber(r.worstRatio)},
-          {"outside", shortNumber(r.outside)}};
+          {"nev", gradeJson(r, r.nev)},
+          {"nev_coverage", gradeJson(r, r.nevCoverage)},
+          {"worst_ratio", gradeJson(r, r.worstRatio)},
+          {"outside", gradeJson(r, r.outside)}};
 }
 
 Angles anglesAt(const LobeCache& cache, int index) {
@@ -97,11 +98,12 @@ void printRecordPairs(const CacheDifference& d, const CachePair& caches, std::FI
     const CacheRecord &a = recordOf(caches.a, pair.a), &b = recordOf(caches.b, pair.b);
     const Angles angles = anglesAt(caches.a, pair.a);
     table.add({std::to_string(pair.a), std::to_string(pair.b), fmt::format("{:.2f}", angles.elevation),
-               fmt::format("{:.2f}", angles.azimuth), fmt::format("{:.4f}", a.nev), fmt::format("{:.4f}", b.nev),
-               fmt::format("{:.4f}", a.nevCoverage), fmt::format("{:.4f}", b.nevCoverage), std::to_string(a.count),
-               std::to_string(b.count), fmt::format("{:.2f} %", 100 * a.outside),
-               fmt::format("{:.2f} %", 100 * b.outside), fmt::format("{:.3f}", a.worstRatio),
-               fmt::format("{:.3f}", b.worstRatio)});
+               fmt::format("{:.2f}", angles.azimuth), gradeText(a, fmt::format("{:.4f}", a.nev)),
+               gradeText(b, fmt::format("{:.4f}", b.nev)), gradeText(a, fmt::format("{:.4f}", a.nevCoverage)),
+               gradeText(b, fmt::format("{:.4f}", b.nevCoverage)), componentsText(a), componentsText(b),
+               gradeText(a, fmt::format("{:.2f} %", 100 * a.outside)),
+               gradeText(b, fmt::format("{:.2f} %", 100 * b.outside)),
+               gradeText(a, fmt::format("{:.3f}", a.worstRatio)), gradeText(b, fmt::format("{:.3f}", b.worstRatio))});
   }
   table.print(out);
   fmt::print(out, "\n");
@@ -122,7 +124,7 @@ CacheDifference compareCaches(const LobeCache& a, const LobeCache& b) {
     const auto entry = static_cast<std::uint32_t>(gridB.nearest(directionOf(a, i)));
     RecordPair pair{static_cast<int>(i), static_cast<int>(b.lookup(entry)), false};
     pair.same = sameRecord(a, b, pair);
-    countQuality(d, recordOf(a, pair.a).nev, recordOf(b, pair.b).nev);
+    countQuality(d, recordOf(a, pair.a), recordOf(b, pair.b));
     d.records.push_back(pair);
   }
   return d;

@@ -29,6 +29,7 @@ struct CacheDifference {
   std::vector<FieldDifference> fields;  ///< those that differ
   std::vector<RecordPair> records;      ///< a pair for every record of A
   /// Records of A whose partner needs fewer samples, more, or as many: 1 + NEV, equal within a thousandth.
+  /// None of them where a record is left to the BSDF.
   int better = 0, worse = 0, alike = 0;
 };
 

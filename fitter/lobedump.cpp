@@ -142,9 +142,10 @@ void printLegend(const LobeCache& cache, const Plot& plot, const Options& o) {
     const CacheRecord& r = cache.records()[static_cast<std::size_t>(row.record)];
     const Angles angles = anglesOf(directionOf(cache, static_cast<std::size_t>(row.record)));
     table.add({std::to_string(i + 1), std::to_string(row.record), fmt::format("{:.2f}", angles.elevation),
-               fmt::format("{:.2f}", angles.azimuth), std::to_string(r.count), fmt::format("{:.4f}", r.nev),
-               fmt::format("{:.3f}", r.worstRatio), row.grade ? pointText(toDisc(row.grade->worstAt)) : "-",
-               pointText(row.view.centre), fmt::format("{:.3f}", row.view.half), fmt::format("{:.4g}", row.peak)});
+               fmt::format("{:.2f}", angles.azimuth), componentsText(r), gradeText(r, fmt::format("{:.4f}", r.nev)),
+               gradeText(r, fmt::format("{:.3f}", r.worstRatio)),
+               row.grade ? pointText(toDisc(row.grade->worstAt)) : "-", pointText(row.view.centre),
+               fmt::format("{:.3f}", row.view.half), fmt::format("{:.4g}", row.peak)});
   }
   table.print(stdout);
 }

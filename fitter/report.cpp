@@ -14,7 +14,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 double median(std::vector<double> values) {
-  if (values.empty()) return 0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::ranges::nth_element(values, middle);
   if (values.size() % 2 == 1) return *middle;
@@ -32,11 +31,11 @@ Json recordJson(const LobeCache& cache, std::size_t index) {
             {"azimuth", angles.azimuth},
             {"integral", shortNumber(r.integral)},
             {"albedo", shortNumber(r.albedo)},
-            {"cosine_mass", shortNumber(r.cosineMass)},
-            {"outside", shortNumber(r.outside)},
-            {"nev", shortNumber(r.nev)},
-            {"nev_coverage", shortNumber(r.nevCoverage)},
-            {"worst_ratio", shortNumber(r.worstRatio)},
+            {"cosine_mass", gradeJson(r, r.cosineMass)},
+            {"outside", gradeJson(r, r.outside)},
+            {"nev", gradeJson(r, r.nev)},
+            {"nev_coverage", gradeJson(r, r.nevCoverage)},
+            {"worst_ratio", gradeJson(r, r.worstRatio)},
             {"components", Json::array()}};
   for (const CacheComponent& c : cache.components(r))
     json["components"].push_back({{"weight", shortNumber(c.weight)},
@@ -52,20 +51,35 @@ CacheSummary summarise(const LobeCache& cache) {
   std::vector<double> nev, coverage;
   for (const CacheRecord& r : cache.records()) {
     s.meanComponents += r.count;
+    if (!graded(r)) continue;
     s.outside += r.outside;
     s.worstRatio = std::max(s.worstRatio, static_cast<double>(r.worstRatio));
     nev.push_back(r.nev);
     coverage.push_back(r.nevCoverage);
   }
-  s.records = nev.size();
+  s.records = cache.records().size();
   s.meanComponents /= static_cast<double>(s.records);
-  s.outside /= static_cast<double>(s.records);
+  s.bytes = cache.bytes();
+  s.graded = !nev.empty();
+  if (!s.graded) return s;
+  s.outside /= static_cast<double>(nev.size());
   s.nevMedian = median(nev);
   s.nevWorst = std::ranges::max(nev);
   s.coverageMedian = median(coverage);
   s.coverageWorst = std::ranges::max(coverage);
-  s.bytes = cache.bytes();
   return s;
+}
+
+Json gradeJson(const CacheRecord& record, float value) {
+  return graded(record) ? shortNumber(value) : Json();
+}
+
+std::string gradeText(const CacheRecord& record, const std::string& text) {
+  return graded(record) ? text : "-";
+}
+
+std::string componentsText(const CacheRecord& record) {
+  return graded(record) ? std::to_string(record.count) : "BSDF";
 }
 
 Json shortNumber(float value) {
@@ -87,15 +101,16 @@ void printReports(const std::vector<CacheReport>& reports, bool showRun, std::FI
   Table table(header, showRun ? 2 : 1);
   for (const CacheReport& r : reports) {
     const CacheSummary& s = r.summary;
+    const auto grade = [&](const std::string& text) { return s.graded ? text : "-"; };
     std::vector<std::string> cells{r.lobe,
                                    std::to_string(s.records),
-                                   fmt::format("{:.2f}", s.meanComponents),
-                                   fmt::format("{:.3f}", s.nevMedian),
-                                   fmt::format("{:.3f}", s.nevWorst),
-                                   fmt::format("{:.3f}", s.coverageMedian),
-                                   fmt::format("{:.3f}", s.coverageWorst),
-                                   fmt::format("{:.2f}", s.worstRatio),
-                                   percent(s.outside),
+                                   s.graded ? fmt::format("{:.2f}", s.meanComponents) : "BSDF",
+                                   grade(fmt::format("{:.3f}", s.nevMedian)),
+                                   grade(fmt::format("{:.3f}", s.nevWorst)),
+                                   grade(fmt::format("{:.3f}", s.coverageMedian)),
+                                   grade(fmt::format("{:.3f}", s.coverageWorst)),
+                                   grade(fmt::format("{:.2f}", s.worstRatio)),
+                                   grade(percent(s.outside)),
                                    std::to_string(s.bytes)};
     if (showRun) {
       cells.insert(cells.begin(), abbreviated(r.materials));
@@ -107,14 +122,15 @@ void printReports(const std::vector<CacheReport>& reports, bool showRun, std::FI
 }
 
 Json toJson(const CacheSummary& s) {
+  const auto grade = [&](double value) { return s.graded ? Json(value) : Json(); };
   return {{"records", s.records},
           {"mean_components", s.meanComponents},
-          {"nev_median", s.nevMedian},
-          {"nev_worst", s.nevWorst},
-          {"nev_coverage_median", s.coverageMedian},
-          {"nev_coverage_worst", s.coverageWorst},
-          {"worst_ratio", s.worstRatio},
-          {"outside", s.outside},
+          {"nev_median", grade(s.nevMedian)},
+          {"nev_worst", grade(s.nevWorst)},
+          {"nev_coverage_median", grade(s.coverageMedian)},
+          {"nev_coverage_worst", grade(s.coverageWorst)},
+          {"worst_ratio", grade(s.worstRatio)},
+          {"outside", grade(s.outside)},
           {"bytes", s.bytes}};
 }
 
@@ -174,9 +190,10 @@ void printRecords(const LobeCache& cache, std::FILE* out) {
     const CacheRecord& r = cache.records()[i];
     const Angles angles = anglesOf(directionOf(cache, i));
     table.add({std::to_string(i), fmt::format("{:.2f}", angles.elevation), fmt::format("{:.2f}", angles.azimuth),
-               std::to_string(r.count), fmt::format("{:.5g}", r.integral), fmt::format("{:.5f}", r.albedo),
-               fmt::format("{:.5f}", r.cosineMass), percent(r.outside), fmt::format("{:.4f}", r.nev),
-               fmt::format("{:.4f}", r.nevCoverage), fmt::format("{:.3f}", r.worstRatio)});
+               componentsText(r), fmt::format("{:.5g}", r.integral), fmt::format("{:.5f}", r.albedo),
+               gradeText(r, fmt::format("{:.5f}", r.cosineMass)), gradeText(r, percent(r.outside)),
+               gradeText(r, fmt::format("{:.4f}", r.nev)), gradeText(r, fmt::format("{:.4f}", r.nevCoverage)),
+               gradeText(r, fmt::format("{:.3f}", r.worstRatio))});
   }
   table.print(out);
 }

@@ -12,9 +12,15 @@
 
 namespace lobe {
 
-/// Over the records of a cache.
+/// Whether a record has a mixture that was graded; others are left to the BSDF's sampling.
+inline bool graded(const CacheRecord& record) {
+  return record.count > 0;
+}
+
+/// Over the records of a cache; from the NEV on, over those graded.
 struct CacheSummary {
   std::size_t records = 0;
+  bool graded = false;  ///< some record is; else the numbers from the NEV on mean nothing and are 0
   double meanComponents = 0;
   double nevMedian = 0, nevWorst = 0;            ///< drawn from the graded density
   double coverageMedian = 0, coverageWorst = 0;  ///< the same quantity drawn from the lobe's own sampler
@@ -46,8 +52,15 @@ nlohmann::ordered_json toJson(const LobeCache& cache, const std::filesystem::pat
 /// The header of a cache as lines of text.
 void printHeader(const LobeCache& cache, const std::filesystem::path& path, std::FILE* out);
 
-/// A row for every record.
+/// A row for every record; a dash where it is left to the BSDF.
 void printRecords(const LobeCache& cache, std::FILE* out);
+
+/// A number of a record: null, or a dash, where it is not graded.
+nlohmann::ordered_json gradeJson(const CacheRecord& record, float value);
+std::string gradeText(const CacheRecord& record, const std::string& text);
+
+/// The number of components, or "BSDF".
+std::string componentsText(const CacheRecord& record);
 
 /// A float as the shortest decimal that reads back the same, not as the double it converts to.
 nlohmann::ordered_json shortNumber(float value);

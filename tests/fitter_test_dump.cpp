@@ -282,3 +282,23 @@ TEST_CASE("fitter: lobedump shows all quantities of a record") {
   for (const char* options : {"", "--records "})
     CHECK_THAT(folder.run("lobedump good.lobe " + std::string(options)).out, Catch::Contains("worst f/p"));
 }
+
+TEST_CASE("fitter: a lobe that is left to the BSDF has no grade to show") {
+  const Caches folder;
+  LobeCacheInfo info;
+  info.model = info.key = info.summary = info.toolVersion = "mirror";
+  info.gridCount = 2;
+  CacheRecord record{};
+  record.integral = record.albedo = 0.9f;
+  writeAtomically(folder / "mirror.lobe",
+                  encodeLobeCache(info, std::vector{record}, {}, std::vector<std::uint32_t>{0, 0}));
+  const auto json = nlohmann::json::parse(folder.run("lobedump --json mirror.lobe").out)[0];
+  CHECK((json["summary"]["nev_median"].is_null() && json["summary"]["mean_components"] == 0));
+  CHECK((json["records"][0]["nev"].is_null() && json["records"][0]["worst_ratio"].is_null()));
+  CHECK(json["records"][0]["albedo"].get<float>() == 0.9f);
+  const std::string table = folder.run("lobedump --records mirror.lobe").out;
+  CHECK_THAT(table, Catch::Contains("BSDF"));
+  CHECK_THAT(table, !Catch::Contains("0.000"));
+  const auto diff = nlohmann::json::parse(folder.run("lobedump --diff --json mirror.lobe good.lobe").out);
+  CHECK((diff["better"] == 0 && diff["worse"] == 0 && diff["alike"] == 0));
+}
