@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <optional>
+#include <ranges>
 
 #include <tbb/parallel_for.h>
 #include <Eigen/LU>
@@ -78,18 +79,22 @@ std::vector<int> entriesOf(const Lobe& lobe, const DirectionGrid& grid) {
 class DirectionFits {
  public:
   DirectionFits(const Lobe& lobe, const Vec3& wo, const FitSettings& settings)
-      : fitter_(lobe, wo, settings.samples), settings_(settings), most_(byWeightedEm(settings.components)) {
+      : fitter_(lobe, wo, settings.samples), settings_(settings) {
+    // The many records of an anisotropic lobe would spend most of their time on this.
+    if (lobe.kind() != LobeKind::isotropic) return;
+    most_ = byWeightedEm(settings.components);
     const float factor = std::max(1.0f, settings.quality / kDefaultQuality);
-    settings_.quality = std::min(settings.quality, factor * most_.worse());
+    settings_.quality = std::min(settings.quality, factor * most_->worse());
   }
 
   double target() const { return settings_.quality; }
 
   FittedRecord fewest() const { return more(with(1), 2); }
 
-  /// From a neighbour's mixture, which keeps its number of components where that is enough.
+  /// From a neighbour's mixture.
   FittedRecord from(std::span<const Gaussian> start) const {
     FittedRecord fitted = refined(start);
+    if (goodEnough(fitted)) return less(std::move(fitted));
     // With as many components again: a start from far away may lead nowhere.
     const std::uint32_t first = fitted.record.count;
     return more(std::move(fitted), first);
@@ -113,7 +118,7 @@ class DirectionFits {
 
   /// By weighted EM; by least squares from there where that is not good enough.
   FittedRecord with(std::uint32_t components) const {
-    FittedRecord fitted = components == settings_.components ? most_ : byWeightedEm(components);
+    FittedRecord fitted = most_ && components == settings_.components ? *most_ : byWeightedEm(components);
     return goodEnough(fitted) ? fitted : refined(fitted.mixture);
   }
 
@@ -129,9 +134,20 @@ class DirectionFits {
     return best;
   }
 
+  /// Fewer components, while they are good enough.
+  FittedRecord less(FittedRecord best) const {
+    for (const std::uint32_t size : kSizes | std::views::reverse) {
+      if (size >= best.record.count) continue;
+      FittedRecord fitted = with(size);
+      if (!goodEnough(fitted)) break;
+      best = std::move(fitted);
+    }
+    return best;
+  }
+
   DirectionFitter fitter_;
   FitSettings settings_;
-  FittedRecord most_;  // as many components as there may be, by weighted EM
+  std::optional<FittedRecord> most_;  // as many components as there may be, by weighted EM
 };
 
 class AdaptiveFitter {

@@ -13,9 +13,9 @@ namespace lobe {
 inline constexpr float kDefaultQuality = 0.03f;
 
 /// Fits the lobe so that every record has an NEV (Quality::worse) of at most a target, where settings.components
-/// Gaussians can do that, and near the best that they can elsewhere. The target is settings.quality or, if less, what
-/// as many Gaussians have by weighted EM, times quality / kDefaultQuality where more than the default is allowed: so by
-/// default records are as good as weighted EM's.
+/// Gaussians can do that, and near the best that they can elsewhere. The target is settings.quality or, of an isotropic
+/// lobe and if less, what as many Gaussians have by weighted EM, times quality / kDefaultQuality where more than the
+/// default is allowed: so by default the records of isotropic lobes are as good as weighted EM's.
 ///
 /// Directions are taken from coarse to fine. One that the record nearest to it serves with a second moment at most
 /// 1 + target times the record's own, brought to it by alignMixture, gets none of its own. Of a lobe with

@@ -1,4 +1,5 @@
-// lobebench-fit: time and quality of one record by each way to fit it, against Ceres with automatic derivatives.
+// lobebench-fit: time and quality of one record by each way to fit it, against Ceres with automatic derivatives; and
+// what method auto spends on a whole lobe.
 
 #include <algorithm>
 #include <chrono>
@@ -8,9 +9,11 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <tbb/global_control.h>
 #include <nlohmann/json.hpp>
 
 #include "fitter/automatic_fit.h"
+#include "fitter/compile.h"
 #include "fitter/lobe_fit.h"
 #include "fitter/nonlinear_fit.h"
 #include "materials/registry.h"
@@ -70,6 +73,14 @@ struct Row {
   double elevation, milliseconds, nev;
 };
 
+/// A whole lobe by method auto, on one thread.
+struct WholeLobe {
+  std::string surface;
+  int directions;
+  std::size_t records;
+  double milliseconds;
+};
+
 /// The median time of making a mixture.
 template <class F>
 std::pair<Mixture, double> timed(int repeats, const F& make) {
@@ -123,6 +134,15 @@ void measure(const Surface& surface, double elevation, const Options& o, std::ve
   if (o.automatic) add("automatic", 1, [&] { return automaticFit(*lobe, wo, o); });
 }
 
+WholeLobe measureAuto(const Surface& surface) {
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
+  const CompileJob job = planCompile({{surface.lobe(), {}}}, {}).front();
+  const auto start = std::chrono::steady_clock::now();
+  const std::size_t records = fitGrid(*job.use.lobe, job.grid, job.info.settings).records.size();
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return {surface.name(), workOf(job), records, 1000 * seconds};
+}
+
 double median(std::vector<double> values) {
   std::ranges::sort(values);
   return values[values.size() / 2];
@@ -148,27 +168,68 @@ void printTable(const std::string& surface, const std::vector<Row>& rows) {
   std::fflush(stdout);
 }
 
-void printJson(const std::vector<Row>& rows, const Options& o) {
-  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+double medianTime(const std::string& surface, const char* method, const std::vector<Row>& rows) {
+  std::vector<double> times;
   for (const Row& r : rows)
-    json.push_back({{"surface", r.surface},
-                    {"method", r.method},
-                    {"components", o.components},
-                    {"elevation", r.elevation},
-                    {"milliseconds", r.milliseconds},
-                    {"nev", r.nev}});
+    if (r.surface == surface && r.method == method) times.push_back(r.milliseconds);
+  return median(times);
+}
+
+void printRatio(const char* what, const std::vector<double>& ratios) {
+  double logs = 0;
+  for (const double r : ratios) logs += std::log(r) / static_cast<double>(ratios.size());
+  fmt::print("  {:52} {:6.1f} {:6.1f} {:6.1f}\n", what, std::exp(logs), std::ranges::min(ratios),
+             std::ranges::max(ratios));
+}
+
+/// How many times the fit with automatic derivatives takes longer.
+void printRatios(const std::vector<Row>& rows, const std::vector<WholeLobe>& lobes) {
+  std::vector<double> scratch, chained, record, entry;
+  for (const WholeLobe& l : lobes) {
+    const double automatic = medianTime(l.surface, "automatic", rows);
+    scratch.push_back(automatic / medianTime(l.surface, kMethodCeres, rows));
+    chained.push_back(automatic / medianTime(l.surface, "neighbour", rows));
+    record.push_back(automatic * static_cast<double>(l.records) / l.milliseconds);
+    entry.push_back(automatic * l.directions / l.milliseconds);
+  }
+  fmt::print("\nautomatic derivatives take so many times as long as     mean    min    max\n");
+  printRatio("ceres, with its grade", scratch);
+  printRatio("ceres from a neighbour, with its grade", chained);
+  printRatio("auto for a whole lobe, per record that it keeps", record);
+  printRatio("auto for a whole lobe, per direction that it serves", entry);
+}
+
+void printJson(const std::vector<Row>& rows, const std::vector<WholeLobe>& lobes, const Options& o) {
+  nlohmann::ordered_json json{{"records", nlohmann::ordered_json::array()}, {"auto", nlohmann::ordered_json::array()}};
+  for (const Row& r : rows)
+    json["records"].push_back({{"surface", r.surface},
+                               {"method", r.method},
+                               {"components", o.components},
+                               {"elevation", r.elevation},
+                               {"milliseconds", r.milliseconds},
+                               {"nev", r.nev}});
+  for (const WholeLobe& l : lobes)
+    json["auto"].push_back({{"surface", l.surface},
+                            {"directions", l.directions},
+                            {"records", l.records},
+                            {"milliseconds", l.milliseconds}});
   fmt::print("{}\n", json.dump(2));
 }
 
 void run(const Options& o) {
   if (!o.json) fmt::print("surface            method     ms/record NEV median  to {}°     worst\n", kLastGated);
   std::vector<Row> rows;
+  std::vector<WholeLobe> lobes;
   for (const Surface& surface : surfaces()) {
     if (surface.name().find(o.surface) == std::string::npos) continue;
     for (const double elevation : kElevations) measure(surface, elevation, o, rows);
+    lobes.push_back(measureAuto(surface));
     if (!o.json) printTable(surface.name(), rows);
   }
-  if (o.json) printJson(rows, o);
+  if (o.json)
+    printJson(rows, lobes, o);
+  else if (o.automatic && !lobes.empty())
+    printRatios(rows, lobes);
 }
 
 void declare(CLI::App& app, Options& o) {

@@ -238,8 +238,9 @@ int workOf(const CompileJob& job) {
 }
 
 void runCompile(const CompileJob& job, const std::function<void()>& advance) {
-  const FittedGrid fit = fitGrid(*job.use.lobe, job.grid, job.info.settings, advance);
   makeFolder(job.path.parent_path());
+  checkWritable(job.path);
+  const FittedGrid fit = fitGrid(*job.use.lobe, job.grid, job.info.settings, advance);
   LobeCacheInfo info = job.info;
   info.quarter = fit.quarter;
   writeAtomically(job.path, encodeLobeCache(info, fit.records, fit.components, fit.lookup));

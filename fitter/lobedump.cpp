@@ -123,7 +123,11 @@ LobePtr findLobe(const LobeCache& cache, Options& o) {
 std::vector<int> chosenRecords(const LobeCache& cache, const Options& o) {
   const int count = static_cast<int>(cache.records().size());
   if (o.record >= count) throw UsageError(fmt::format("--record must be from 0 to {}", count - 1));
-  return o.record >= 0 ? std::vector{o.record} : spreadRecords(count, kPlotRows);
+  std::vector<int> records = o.record >= 0 ? std::vector{o.record} : spreadRecords(count, kPlotRows);
+  if (std::ranges::any_of(records, [&](int i) { return !graded(cache.records()[static_cast<std::size_t>(i)]); }))
+    throw std::runtime_error(fmt::format("{}: {} is left to the BSDF's own sampling; there is no fit to draw",
+                                         o.files[0], cache.info().summary));
+  return records;
 }
 
 std::string pointText(const Vec2& y) {

@@ -32,9 +32,9 @@ struct Plot {
   std::vector<PlotRow> rows;  ///< from the top
 };
 
-/// Panels of target, fit and ratio for each of the records, or of the fit alone when lobe is null. The lobe is the
-/// cache's. Over the fit lie the ellipses of one standard deviation of all components; the point of the worst f/p is
-/// ringed in all panels, at their border where it is out of view.
+/// Panels of target, fit and ratio for each of the records, which have components, or of the fit alone when lobe is
+/// null. The lobe is the cache's. Over the fit lie the ellipses of one standard deviation of all components; the point
+/// of the worst f/p is ringed in all panels, at their border where it is out of view.
 Plot plotRecords(const LobeCache& cache, std::span<const int> records, const Lobe* lobe);
 
 /// At most `rows` of `count` records, evenly from first to last.

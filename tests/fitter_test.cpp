@@ -258,3 +258,12 @@ TEST_CASE("fitter: look-up pushes no mean out of the disc") {
       CHECK(g.mean().norm() <= 1.00001f);
   }
 }
+
+TEST_CASE("fitter: look-up moves a lobe whatever holds up its tail at the edge") {
+  const std::array<Gaussian, 2> mixture{{{0.1f, -0.1f, 0.994f, {1, 0, 3}}, {0.9f, -0.2f, 0, {0.01f, 0, 0.01f}}}};
+  std::array<Gaussian, 2> out;
+  const Vec3 from = direction(20, 5), to = direction(22, -10);
+  alignMixture({GridKind::fibonacci, toDisc(from), {}}, mixture, to, out);
+  CHECK((out[1].mean() - (mixture[1].mean() + toDisc(from) - toDisc(to))).norm() < 1e-6f);
+  CHECK(out[0].mean().norm() <= 1.00001f);
+}

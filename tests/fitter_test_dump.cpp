@@ -299,6 +299,8 @@ TEST_CASE("fitter: a lobe that is left to the BSDF has no grade to show") {
   const std::string table = folder.run("lobedump --records mirror.lobe").out;
   CHECK_THAT(table, Catch::Contains("BSDF"));
   CHECK_THAT(table, !Catch::Contains("0.000"));
+  const ToolRun plot = folder.run("lobedump --plot x.png mirror.lobe");
+  CHECK((plot.code == 1 && plot.error.find("no fit to draw") != std::string::npos));
   const auto diff = nlohmann::json::parse(folder.run("lobedump --diff --json mirror.lobe good.lobe").out);
   CHECK((diff["better"] == 0 && diff["worse"] == 0 && diff["alike"] == 0));
 }

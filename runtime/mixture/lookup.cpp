@@ -44,9 +44,9 @@ std::span<Gaussian> alignMixture(const Alignment& alignment, std::span<const Gau
     for (std::size_t k = 0; k < out.size(); ++k) out[k] = mirrored(components[k], alignment.mirror);
   }
   const Vec2 step = reference - toDisc(wo);
-  float t = 1.0f;
-  for (const Gaussian& g : out) t = std::min(t, largestStep(g.mean(), step));
   for (Gaussian& g : out) {
+    // Each by itself: a broad component at the edge, which fits a tail, must not keep the lobe from moving.
+    const float t = largestStep(g.mean(), step);
     g.meanX += t * step.x();
     g.meanY += t * step.y();
   }
