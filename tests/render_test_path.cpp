@@ -235,6 +235,11 @@ struct UniformSampler {
       return BsdfSample{wi, hit_.bsdf->eval(hit_.wo, wi, hit_.uv), density_};
     }
     float pdf(const Vec3& wi) const { return wi.z() * hit_.wo.z() > 0 ? density_ : 0; }
+    // As wrong as can be, yet repeatable: paths are split and ended by it.
+    std::optional<float> reflectedRadiance() const {
+      const float wild = std::sin(100 * hit_.position.sum());
+      return wild > 0 ? std::optional(std::exp(4 * wild)) : std::nullopt;
+    }
 
    private:
     float density_;
@@ -244,7 +249,10 @@ struct UniformSampler {
 
 class UniformIntegrator : public Integrator {
  public:
-  UniformIntegrator(const RenderScene& scene, float fault) : scene_(scene), sampler_{fault} {}
+  UniformIntegrator(const RenderScene& scene, float fault, Termination termination = Termination::plain)
+      : scene_(scene), sampler_{fault} {
+    options_.termination = termination;
+  }
   Rgb radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const override {
     return PathLoop(scene_, options_, sampler_).radiance(ray, rng, statistics);
   }
@@ -266,6 +274,21 @@ TEST_CASE("render: all ways of sampling estimate the same light") {
   CHECK(deviation(path, estimate(UniformIntegrator(ready, 1.0f), kLookIntoRoom, 100000, 9)) < kMaxDeviation);
   // A density that is off by a tenth must not pass.
   CHECK(deviation(path, estimate(UniformIntegrator(ready, 1.1f), kLookIntoRoom, 100000, 9)) > kMaxDeviation);
+}
+
+TEST_CASE("render: splitting and ending paths by what is expected of them changes no mean, however wrong that is") {
+  const Scene scene = roomScene();
+  const RenderScene ready(scene);
+  const Moments path = estimate(PathIntegrator(ready, {}), kLookIntoRoom, 100000);
+  const UniformIntegrator window(ready, 1.0f, Termination::window);
+  CHECK(deviation(path, estimate(window, kLookIntoRoom, 100000, 9)) < kMaxDeviation);
+  PathStatistics plain, split;
+  Rng rng(3);
+  for (int i = 0; i < 1000; ++i) {
+    UniformIntegrator(ready, 1.0f).radiance(kLookIntoRoom, rng, plain);
+    window.radiance(kLookIntoRoom, rng, split);
+  }
+  CHECK(split.segments > 2 * plain.segments);
 }
 
 TEST_CASE("render: an image depends on the seed, not on threads or waves") {

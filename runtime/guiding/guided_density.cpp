@@ -37,7 +37,8 @@ GuidedDensity::GuidedDensity(const Reflectance& reflectance, const IlluminationR
   product_.emplace(reflectance.gaussians(), reflectance.constant, illumination.gaussians());
   const float background = illumination.background * reflectance.backgroundMass;
   const float gaussian = (1.0f - illumination.background) * product_->mass();
-  const float share = shares.product * gaussian / (background + gaussian);
+  reflected_ = background + gaussian;
+  const float share = shares.product * gaussian / reflected_;
   if (!(share > 0 && product_->mass() > 0)) return;
   productShare_ = std::min(share, shares.product);
   productScale_ = productShare_ / product_->mass();

@@ -33,6 +33,9 @@ class GuidedDensity {
   /// Views both; they outlive it. Where the product has no mass its share goes to the BSDF.
   GuidedDensity(const Reflectance& reflectance, const IlluminationRecord& illumination, const StrategyShares& shares);
 
+  /// ∫ ρ p_L dA, what the reflectance given makes of one unit of irradiance; 0 without a product (shares.product 0).
+  float reflected() const { return reflected_; }
+
   /// The probability of Strategy::bsdf.
   float bsdfShare() const { return bsdfShare_; }
 
@@ -50,6 +53,7 @@ class GuidedDensity {
   const IlluminationRecord& illumination_;
   std::optional<Product> product_;
   float bsdfShare_;
+  float reflected_ = 0;
   float productShare_ = 0;  // of the product's Gaussian term
   float illuminationShare_;
   float productScale_ = 0;  // productShare_ / mass of the product

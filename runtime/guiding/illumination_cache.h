@@ -21,6 +21,7 @@ struct IlluminationRecord {
   Vec3 tangent;      ///< unit, orthogonal to normal
   float radius;      ///< world units, the record serves points within
   float background;  ///< u in [0,1]
+  float irradiance;  ///< ∫ L cosθ, from all light, in units that are the same for all records; 0: not known
   float samples;     ///< particles seen in training
   std::int32_t count = 0;
   std::array<Gaussian, kMaxIlluminationComponents / 2> components;  ///< weights sum to 1

@@ -107,6 +107,8 @@ std::optional<double> IlluminationTrainer::updateAll(const ParticleNeighbours& n
     if (found.points.empty()) return;
     likelihoods[i] = meanLogLikelihood(found.points, record.em.gaussians(), record.em.background());
     record.em.update(found.points);
+    ++record.passes;
+    record.irradiance += (found.irradiance - record.irradiance) / static_cast<float>(record.passes);
     shrinkRadius(record);
   });
   double sum = 0;
@@ -147,9 +149,8 @@ std::optional<IlluminationTrainer::Training> IlluminationTrainer::makeRecord(con
   const Vec3 tangent = request.normal.unitOrthogonal();
   const Neighbourhood found = neighbours.around(request.position, request.normal, tangent);
   if (found.points.empty()) return std::nullopt;
-  Training record{request.position, request.normal,
-                  tangent,          std::clamp(found.radius, 0.1f * unit_, unit_),
-                  found.distance,   StepwiseEm(options_.components, options_.em)};
+  Training record{request.position, request.normal,   tangent, std::clamp(found.radius, 0.1f * unit_, unit_),
+                  found.distance,   found.irradiance, 1,       StepwiseEm(options_.components, options_.em)};
   record.em.fit(found.points);
   shrinkRadius(record);
   return record;
@@ -180,6 +181,7 @@ void IlluminationTrainer::rebuildCache() {
     r.tangent = t.tangent;
     r.radius = t.radius;
     r.background = t.em.background();
+    r.irradiance = t.irradiance;
     r.samples = static_cast<float>(t.em.samplesSeen());
     r.count = static_cast<std::int32_t>(t.em.gaussians().size());
     std::ranges::copy(t.em.gaussians(), r.components.begin());

@@ -51,7 +51,9 @@ class IlluminationTrainer {
   struct Training {
     Vec3 position, normal, tangent;
     float radius;
-    float distance;  // mean distance that the light came from
+    float distance;    // mean distance that the light came from
+    float irradiance;  // mean over the passes since it was made
+    int passes;
     StepwiseEm em;
   };
 

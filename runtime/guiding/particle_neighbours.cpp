@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include <Eigen/Geometry>
 #include <nanoflann.hpp>
@@ -77,7 +78,7 @@ class NearestSet {
 
 /// Sums over one source.
 struct Tally {
-  double weight = 0, squares = 0, inverseDistance = 0;
+  double weight = 0, squares = 0, inverseDistance = 0, flux = 0;
   float radius2 = 0;
 
   double effectiveSamples() const { return squares > 0 ? weight * weight / squares : 0; }
@@ -104,6 +105,7 @@ class ParticleNeighbours::Tree {
       tally.weight += p.weight;
       tally.squares += static_cast<double>(p.weight) * p.weight;
       tally.inverseDistance += p.weight / p.distance;
+      tally.flux += p.flux;
     }
     return tally;
   }
@@ -131,6 +133,7 @@ Neighbourhood ParticleNeighbours::around(const Vec3& x, const Vec3& n, const Vec
     const Tally tally = tree->collect(x, n, tangent, all.points);
     const double effective = tally.effectiveSamples();
     if (!(effective > 0)) continue;
+    if (tally.radius2 > 0) all.irradiance += static_cast<float>(tally.flux / (std::numbers::pi * tally.radius2));
     const double scale = effective / tally.weight;
     for (std::size_t i = first; i < all.points.size(); ++i)
       all.points[i].weight = static_cast<float>(all.points[i].weight * scale);

@@ -20,6 +20,8 @@ struct Neighbourhood {
   float radius = 0;
   /// Harmonic mean of the distances that the light came from; +infinity when all comes from the environment.
   float distance = std::numeric_limits<float>::infinity();
+  /// Flux per area, from the density of particles; 0 when no source tells.
+  float irradiance = 0;
 };
 
 class ParticleNeighbours {

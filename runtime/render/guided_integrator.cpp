@@ -62,6 +62,8 @@ GuidedSampler::Vertex::Vertex(const GuidedSampler& sampler, const SurfaceHit& hi
   if (!record) return;
   axes_ = guideAxes(hit, *record, side);
   const LobeMixture mixture = hit.bsdf->mixture(hit.wo, hit.uv);
+  irradiance_ = record->irradiance;
+  product_ = sampler.caches_ != nullptr;
   StrategyShares shares = kGuidedShares;
   if (sampler.caches_) {
     collectReflectance(sampler, hit, mixture, side);
@@ -108,6 +110,13 @@ std::optional<BsdfSample> GuidedSampler::Vertex::sample(Rng& rng, PathStatistics
 float GuidedSampler::Vertex::pdf(const Vec3& wi) const {
   const float bsdf = hit_.bsdf->pdf(hit_.wo, wi, hit_.uv);
   return density_ ? density_->bsdfShare() * bsdf + density_->guidedPdf(toGuide(wi)) : bsdf;
+}
+
+std::optional<float> GuidedSampler::Vertex::reflectedRadiance() const {
+  // Nothing is known of light that comes through the surface.
+  if (!(irradiance_ > 0) || hit_.bsdf->transmits()) return std::nullopt;
+  const float diffuse = product_ ? reflectance_.uncoveredAlbedo : luminance(hit_.bsdf->albedo(hit_.wo, hit_.uv));
+  return irradiance_ * (diffuse * kInvPi + (product_ ? density_->reflected() : 0.0f));
 }
 
 Rgb GuidedIntegrator::radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const {

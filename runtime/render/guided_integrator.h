@@ -26,6 +26,7 @@ class GuidedSampler {
 
     std::optional<BsdfSample> sample(Rng& rng, PathStatistics& statistics) const;
     float pdf(const Vec3& wi) const;
+    std::optional<float> reflectedRadiance() const;
     /// Whether there is a record for this point.
     bool guided() const { return density_.has_value(); }
 
@@ -38,6 +39,8 @@ class GuidedSampler {
     Reflectance reflectance_;
     Eigen::Matrix3f axes_;  // from the shading frame to the guide's
     std::optional<GuidedDensity> density_;
+    float irradiance_ = 0;  // of the record
+    bool product_ = false;
   };
 
  private:

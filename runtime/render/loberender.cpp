@@ -60,6 +60,11 @@ void declare(CLI::App& app, Options& options) {
   app.add_option("--seconds", job.seconds, "Seconds of training and rendering, instead of --spp");
   app.add_option("--size", options.size, "WIDTHxHEIGHT in pixels, instead of the scene's");
   app.add_option("--max-depth", job.maxDepth, "Longest path in segments (default: no limit)");
+  app.add_option("--termination", job.termination,
+                 "How paths end: plain, by what they carry, or window, by what is expected of them (guided, product)")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, Termination>{{"plain", Termination::plain}, {"window", Termination::window}}))
+      ->default_str("plain");
   app.add_option("--seed", job.seed, "Random seed")
       ->check(CLI::Range(std::uint64_t{0}, kMaxSeed))
       ->capture_default_str();

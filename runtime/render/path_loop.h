@@ -13,11 +13,15 @@
 //       std::optional<BsdfSample> sample(Rng& rng, PathStatistics& statistics) const;
 //       // The density of sample over solid angle.
 //       float pdf(const Vec3& wi) const;
+//       // The radiance, luminance, that leaves towards wo by reflection, in units that all vertices share; nullopt:
+//       // not known.
+//       std::optional<float> reflectedRadiance() const;
 //     };
 //   };
 //
 // Directions are local in hit.frame, whose z is on the geometric front side: hit.wo may have z < 0. hit.bsdf exists.
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -27,13 +31,28 @@
 
 namespace lobe {
 
+/// How paths end. plain: by what they still carry. window: Russian roulette and splitting keep the contribution that is
+/// expected of a vertex near what the path promised at its first one (Vorba and Křivánek 2016, "Adjoint-Driven Russian
+/// Roulette and Splitting"; they compare with an estimate of the pixel, here it is the first vertex's own, whose units
+/// and errors are those of the vertices after it); plain where nothing is known.
+enum class Termination { plain, window };
+
 struct PathOptions {
   int maxDepth = std::numeric_limits<int>::max();  ///< segments: 1 shows emitters only, 2 adds direct light
   int rouletteDepth = 5;                           ///< segments before paths may end by chance
+  Termination termination = Termination::plain;
 };
 
 /// At most this often does a path go on once Russian roulette may end it, so that every path ends.
 inline constexpr float kMaxSurvival = 0.95f;
+
+/// The window's bounds for the ratio of expected to promised contribution: their ratio is 5, their mean 1 (ibid., Eq.
+/// 6).
+inline constexpr float kWindowLow = 1.0f / 3.0f, kWindowHigh = 5.0f / 3.0f;
+/// An expectation may be too low by any factor: what survives it must not outshine everything.
+inline constexpr float kLeastSurvival = 0.2f;
+/// Of the branches that one camera path may have become.
+inline constexpr int kMaxBranches = 16;
 
 /// The share of an estimate whose own technique has density `own` where another has `other` (power heuristic).
 inline float misWeight(float own, float other) {
@@ -50,8 +69,7 @@ class PathLoop {
   Rgb radiance(const Ray& cameraRay, Rng& rng, PathStatistics& statistics) const {
     Path path{cameraRay, rng, statistics};
     ++statistics.paths;
-    for (path.depth = 1; path.depth <= options_.maxDepth; ++path.depth)
-      if (!advance(path)) break;
+    follow(path);
     return path.radiance;
   }
 
@@ -67,7 +85,14 @@ class PathLoop {
     float eta2 = 1;              // how much refraction has compressed radiance so far, which termination has to undo
     Vec3 previous = Vec3::Zero();
     int depth = 0;
+    float promised = 0;  // expected contribution of the first vertex that says; 0: none yet
+    int branches = 1;    // that the camera's path has become on the way here
   };
+
+  void follow(Path& path) const {
+    for (++path.depth; path.depth <= options_.maxDepth; ++path.depth)
+      if (!advance(path)) break;
+  }
 
   // One segment and what happens at its end; false: the path is over.
   bool advance(Path& path) const {
@@ -80,7 +105,7 @@ class PathLoop {
     }
     if (hit->emitter) addEmission(path, emittedRadiance(*hit), path.pdf > 0.0f ? lightPdf(path, *hit) : 0.0f);
     if (!hit->bsdf || path.depth >= options_.maxDepth || !sidesAgree(*hit, hit->woWorld, hit->wo)) return false;
-    return survives(path) && scatter(path, *hit);
+    return scatter(path, *hit);
   }
 
   float lightPdf(const Path& path, const SurfaceHit& hit) const { return scene_.lights.pdf(path.previous, hit); }
@@ -90,24 +115,57 @@ class PathLoop {
     path.radiance += path.throughput * emitted * weight;
   }
 
-  bool survives(Path& path) const {
+  // By what the path carries; divides it by the probability.
+  bool survivesPlain(Path& path) const {
     if (path.depth < options_.rouletteDepth) return true;
     // A guided direction has a small throughput because much light is expected there: it must not die of that.
     const float carried = std::max(path.throughput.maxCoeff() * path.eta2, path.expected.maxCoeff());
-    const float survival = std::min(carried, kMaxSurvival);
+    return survives(path, std::min(carried, kMaxSurvival));
+  }
+
+  static bool survives(Path& path, float survival) {
     if (path.rng.uniform() >= survival) return false;
     path.throughput /= survival;
     return true;
   }
 
+  // How many times the path goes on from the vertex: 0 when it ends here.
+  int continuations(Path& path, const typename Sampler::Vertex& vertex) const {
+    const std::optional<float> leaving =
+        options_.termination == Termination::window ? vertex.reflectedRadiance() : std::nullopt;
+    if (!leaving) return survivesPlain(path) ? 1 : 0;
+    const float expected = luminance(path.throughput) * *leaving;
+    if (path.promised <= 0) path.promised = expected;
+    const float ratio = path.promised > 0 ? expected / path.promised : 1.0f;
+    // So that every path ends.
+    const float most = path.depth >= options_.rouletteDepth ? kMaxSurvival : 1.0f;
+    if (!(ratio >= kWindowLow)) return survives(path, std::clamp(ratio / kWindowLow, kLeastSurvival, most)) ? 1 : 0;
+    if (!survives(path, most)) return 0;
+    const int room = kMaxBranches / path.branches;
+    return ratio <= kWindowHigh ? 1 : std::max(1, std::min(static_cast<int>(std::min(ratio, 1e3f)), room));
+  }
+
   bool scatter(Path& path, const SurfaceHit& hit) const {
     const float deltaShare = hit.bsdf->deltaProbability(hit.wo, hit.uv);
-    if (deltaShare < 1.0f) {
-      const typename Sampler::Vertex vertex(sampler_, hit);
-      addDirectLight(path, hit, vertex, 1.0f - deltaShare);
-      if (deltaShare <= 0.0f || path.rng.uniform() >= deltaShare)
-        return scatterSmooth(path, hit, vertex, 1.0f - deltaShare);
+    if (deltaShare >= 1.0f) return survivesPlain(path) && scatterDelta(path, hit, deltaShare);
+    const typename Sampler::Vertex vertex(sampler_, hit);
+    const int copies = continuations(path, vertex);
+    if (copies == 0) return false;
+    path.throughput /= static_cast<float>(copies);
+    path.branches *= copies;
+    for (int i = 1; i < copies; ++i) {
+      Path branch = path;
+      branch.radiance = Rgb::Zero();
+      if (scatterAt(branch, hit, vertex, deltaShare)) follow(branch);
+      path.radiance += branch.radiance;
     }
+    return scatterAt(path, hit, vertex, deltaShare);
+  }
+
+  bool scatterAt(Path& path, const SurfaceHit& hit, const typename Sampler::Vertex& vertex, float deltaShare) const {
+    addDirectLight(path, hit, vertex, 1.0f - deltaShare);
+    if (deltaShare <= 0.0f || path.rng.uniform() >= deltaShare)
+      return scatterSmooth(path, hit, vertex, 1.0f - deltaShare);
     return scatterDelta(path, hit, deltaShare);
   }
 

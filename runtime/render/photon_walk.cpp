@@ -8,7 +8,7 @@ namespace {
 // The weight window (training notes, "Parameters"), in shares of the emitted power.
 constexpr float kLowestWeight = 1e-6f;
 constexpr float kHighestWeight = 2 + kLowestWeight;
-constexpr int kMaxBranches = 64;  // of one photon that wait at a time
+constexpr int kMaxWaiting = 64;  // of one photon that wait at a time
 
 /// What BSDF sampling is left with where emitter sampling finds the same light (nothing of a delta light's); a cosine
 /// stands for the density to come.
@@ -58,10 +58,11 @@ void PhotonWalk::advance(const EmittedPhoton& photon, Branch branch) {
 
 void PhotonWalk::store(const EmittedPhoton& photon, const Branch& branch, const SurfaceHit& hit) {
   const bool first = branch.depth == 1;
-  const float weight = luminance(branch.flight.weight) * (first ? directShare(photon, hit) : 1.0f);
+  const float flux = luminance(branch.flight.weight);
+  const float weight = flux * (first ? directShare(photon, hit) : 1.0f);
   if (usable(weight))
     result_.particles.push_back(
-        {hit.position, normalTowards(hit), hit.woWorld, weight, first && photon.far ? kInfinity : hit.distance});
+        {hit.position, normalTowards(hit), hit.woWorld, weight, first && photon.far ? kInfinity : hit.distance, flux});
 }
 
 // How many branches go on: none, by chance, of a photon that carries next to nothing, several of one that carries too
@@ -74,7 +75,7 @@ int PhotonWalk::applyWeightWindow(Rgb& weight) {
     return rng_.uniform() * kLowestWeight < relative ? 1 : 0;
   }
   if (relative <= kHighestWeight) return 1;
-  const int room = std::max(1, kMaxBranches - static_cast<int>(waiting_.size()));
+  const int room = std::max(1, kMaxWaiting - static_cast<int>(waiting_.size()));
   const int branches = std::min(static_cast<int>(std::min(relative / 2, 1e3f)) + 1, room);
   weight /= static_cast<float>(branches);
   return branches;

@@ -218,9 +218,8 @@ void prepare(const RenderJob& job, const RenderScene& scene, const RayCamera& ca
   const BrdfCaches* caches = guiding.caches ? &*guiding.caches : nullptr;
   const bool timed = plan.seconds < kInfinity;
   Progress progress("training", timed ? plan.seconds : plan.passes);
-  guiding.training = trainIllumination(scene, camera, caches, plan, [&](const PassReport& pass) {
-    progress.advance(timed ? pass.seconds : 1.0);
-  });
+  guiding.training = trainIllumination(scene, camera, caches, plan,
+                                       [&](const PassReport& pass) { progress.advance(timed ? pass.seconds : 1.0); });
   guiding.sampler.emplace(scene.scene, guiding.training.cache, caches);
 }
 
@@ -247,6 +246,7 @@ void drawRecord(const RenderJob& job, const RenderScene& scene, const Receiver& 
 std::unique_ptr<Integrator> makeIntegrator(const RenderJob& job, const RenderScene& scene, const Guiding& guiding) {
   PathOptions options;
   if (job.maxDepth) options.maxDepth = *job.maxDepth;
+  options.termination = job.termination;
   if (!guiding.sampler) return std::make_unique<PathIntegrator>(scene, options);
   return std::make_unique<GuidedIntegrator>(scene, options, *guiding.sampler);
 }

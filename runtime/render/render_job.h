@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "materials/image.h"
+#include "runtime/render/path_loop.h"
 #include "runtime/render/training.h"
 
 namespace lobe {
@@ -27,6 +28,7 @@ struct RenderJob {
   std::optional<double> seconds;  ///< of training and rendering together
   std::optional<std::pair<int, int>> size;
   std::optional<int> maxDepth;  ///< segments
+  Termination termination = Termination::plain;
   std::uint64_t seed = 1;
   TrainingPlan training;
   std::optional<int> passes;           ///< of training; by default the plan's, or without limit where time is one
