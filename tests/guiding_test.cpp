@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 
+#include <cstring>
 #include <numbers>
 
 #include "runtime/guiding/guided_density.h"
@@ -39,11 +40,20 @@ IlluminationRecord recordAt(const Vec3& x, const Vec3& n, float radius) {
   return r;
 }
 
+/// A cache of one record, and that record as it is used.
+struct OneRecord {
+  explicit OneRecord(const IlluminationRecord& record)
+      : cache({record}, 1), packed(*cache.find(record.position, record.normal)) {}
+  IlluminationCache cache;
+  const PackedRecord& packed;
+};
+
 /// The rule of IlluminationCache::find, spelt out over all records.
-const IlluminationRecord* bruteForce(const IlluminationCache& cache, const Vec3& x, const Vec3& n, float unit) {
+const IlluminationRecord* bruteForce(std::span<const IlluminationRecord> records, const Vec3& x, const Vec3& n,
+                                     float unit) {
   const IlluminationRecord* best = nullptr;
   float bestCost = 1e30f;
-  for (const IlluminationRecord& r : cache.records()) {
+  for (const IlluminationRecord& r : records) {
     const float distance = (x - r.position).norm();
     if (distance > r.radius || n.dot(r.normal) < 0.75f) continue;
     const float cost = distance / unit + 2 * std::sqrt(std::max(0.0f, 1.001f - n.dot(r.normal)));
@@ -93,12 +103,39 @@ TEST_CASE("guiding: the look-up finds the best valid record") {
   for (int i = 0; i < 5000; ++i) {
     const Vec3 x = randomPoint(rng) * 1.2f - Vec3::Constant(0.1f);
     const Vec3 n = randomDirection(rng);
-    const IlluminationRecord* expected = bruteForce(cache, x, n, unit);
-    REQUIRE(cache.find(x, n) == expected);
+    const IlluminationRecord* expected = bruteForce(records, x, n, unit);
+    const PackedRecord* record = cache.find(x, n);
+    REQUIRE((record ? &records[record->index] : nullptr) == expected);
     found += expected != nullptr;
   }
   CHECK(found > 500);
   CHECK(IlluminationCache().find({0, 0, 0}, Vec3::UnitZ()) == nullptr);
+}
+
+TEST_CASE("guiding: records come back as they were given, and few Gaussians take half the room") {
+  Rng rng(17);
+  std::vector<IlluminationRecord> records;
+  for (int count = 0; count <= kMaxLightComponents; ++count) {
+    records.push_back(recordAt(randomPoint(rng), randomDirection(rng), 0.1f + rng.uniform()));
+    records.back().count = count;
+    for (Gaussian& g : records.back().components)
+      g = {rng.uniform(), rng.uniform(), rng.uniform(), {0.1f + rng.uniform(), 0.1f * rng.uniform(), 0.1f}};
+  }
+  const IlluminationCache cache(records, 1);
+  const std::vector<IlluminationRecord> back = cache.records();
+  REQUIRE(back.size() == records.size());
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    const IlluminationRecord &a = records[i], &b = back[i];
+    CHECK((a.position == b.position && a.normal == b.normal && a.tangent == b.tangent && a.radius == b.radius));
+    CHECK((a.background == b.background && a.samples == b.samples && a.count == b.count));
+    const auto bytes = static_cast<std::size_t>(a.count) * sizeof(Gaussian);
+    CHECK(std::memcmp(a.components.data(), b.components.data(), bytes) == 0);
+  }
+  const auto bytesOf = [](IlluminationRecord r, int count) {
+    r.count = count;
+    return IlluminationCache({r}, 1).bytes();
+  };
+  CHECK(bytesOf(records[0], 8) - bytesOf(records[0], 4) == 160);
 }
 
 TEST_CASE("guiding: the look-up works far from the origin") {
@@ -117,29 +154,30 @@ TEST_CASE("guiding: training finds the light and the background") {
   IlluminationTrainer trainer({}, 10.0f);
   for (int pass = 0; pass < 6; ++pass)
     learn(trainer, planeParticles(20000, towards, 0.3f, 100 + pass), planeRequests(500));
-  REQUIRE(!trainer.cache().records().empty());
+  REQUIRE(trainer.cache().size() > 0);
   CHECK(trainer.undersampledShare() == 0);
-  const IlluminationRecord* record = trainer.cache().find({0.5f, 0.5f, 0}, Vec3::UnitZ());
-  REQUIRE(record);
-  CHECK(record->background == Approx(0.3f).margin(0.1f));
+  const PackedRecord* found = trainer.cache().find({0.5f, 0.5f, 0}, Vec3::UnitZ());
+  REQUIRE(found);
+  const IlluminationRecord record = trainer.cache().unpacked(*found);
+  CHECK(record.background == Approx(0.3f).margin(0.1f));
   Vec2 mean = Vec2::Zero();
-  for (const Gaussian& g : record->gaussians()) mean += g.weight * g.mean();
-  const Vec3 bitangent = record->normal.cross(record->tangent);
-  const Vec2 expected = toDisc({towards.dot(record->tangent), towards.dot(bitangent), towards.z()});
+  for (const Gaussian& g : record.gaussians()) mean += g.weight * g.mean();
+  const Vec3 bitangent = record.normal.cross(record.tangent);
+  const Vec2 expected = toDisc({towards.dot(record.tangent), towards.dot(bitangent), towards.z()});
   CHECK((mean - expected).norm() < 0.05f);
 }
 
 TEST_CASE("guiding: training places no record where no particle is, and none twice") {
   IlluminationTrainer trainer({}, 10.0f);
   learn(trainer, {}, planeRequests(10));
-  CHECK(trainer.cache().records().empty());
+  CHECK(trainer.cache().size() == 0);
   const auto particles = planeParticles(5000, Vec3::UnitZ(), 0.5f, 3);
   const std::vector<RecordRequest> elsewhere{{{5, 5, 0}, Vec3::UnitZ()}, {{0.5f, 0.5f, 0}, -Vec3::UnitZ()}};
   learn(trainer, particles, elsewhere);
-  CHECK(trainer.cache().records().empty());
+  CHECK(trainer.cache().size() == 0);
   const std::vector<RecordRequest> same(5, RecordRequest{{0.5f, 0.5f, 0}, Vec3::UnitZ()});
   learn(trainer, particles, same);
-  CHECK(trainer.cache().records().size() == 1);
+  CHECK(trainer.cache().size() == 1);
 }
 
 TEST_CASE("guiding: sources of any scale are learnt from alike, each by its effective number of samples") {
@@ -197,9 +235,8 @@ Reflectance someReflectance() {
   Reflectance r;
   r.constant = 0.05f;
   r.backgroundMass = 0.4f;
-  r.count = 2;
-  r.components[0] = {0.3f, 0.25f, 0.15f, {0.02f, 0.0f, 0.01f}};
-  r.components[1] = {0.1f, 0.7f, 0.6f, {0.05f, 0.01f, 0.05f}};  // partly outside the disc
+  r.gaussians.add({0.3f, 0.25f, 0.15f, {0.02f, 0.0f, 0.01f}});
+  r.gaussians.add({0.1f, 0.7f, 0.6f, {0.05f, 0.01f, 0.05f}});  // partly outside the disc
   return r;
 }
 
@@ -238,9 +275,9 @@ double largestDeviation(const GuidedDensity& density, double mutant) {
 
 TEST_CASE("guiding: what is sampled has the density that is said") {
   const Reflectance reflectance = someReflectance();
-  const IlluminationRecord record = recordAt(Vec3::Zero(), Vec3::UnitZ(), 1);
+  const OneRecord record(recordAt(Vec3::Zero(), Vec3::UnitZ(), 1));
   for (const StrategyShares& shares : {kProductShares, kUncertainProductShares, kGuidedShares}) {
-    const GuidedDensity density(reflectance, record, shares);
+    const GuidedDensity density(reflectance, record.packed, shares);
     CHECK(density.bsdfShare() >= shares.bsdf);
     CHECK(largestDeviation(density, 1.0) < 5);
     CHECK(largestDeviation(density, 1.1) > 5);  // a density that is wrong by a tenth is seen
@@ -248,12 +285,11 @@ TEST_CASE("guiding: what is sampled has the density that is said") {
 }
 
 TEST_CASE("guiding: without a product its share goes to the BSDF") {
-  Reflectance far = someReflectance();
-  far.constant = 0;
-  far.count = 1;
-  far.components[0] = {1.0f, 50.0f, 50.0f, {1e-6f, 0, 1e-6f}};
-  const IlluminationRecord record = recordAt(Vec3::Zero(), Vec3::UnitZ(), 1);
-  const GuidedDensity density(far, record, kProductShares);
+  Reflectance far;
+  far.backgroundMass = 0.4f;
+  far.gaussians.add({1.0f, 50.0f, 50.0f, {1e-6f, 0, 1e-6f}});
+  const OneRecord record(recordAt(Vec3::Zero(), Vec3::UnitZ(), 1));
+  const GuidedDensity density(far, record.packed, kProductShares);
   CHECK(density.bsdfShare() == Approx(0.95f));
   CHECK(std::isfinite(density.guidedPdf({0.6f, 0, 0.8f})));
   CHECK(density.guidedPdf({0.6f, 0, -0.8f}) == 0);
@@ -263,10 +299,11 @@ TEST_CASE("guiding: a diffuse point takes the illumination mixture as it is") {
   Reflectance diffuse;
   diffuse.constant = 0.5f / kPi;
   diffuse.backgroundMass = diffuse.constant;
-  const IlluminationRecord record = recordAt(Vec3::Zero(), Vec3::UnitZ(), 1);
-  const GuidedDensity density(diffuse, record, {0.9f, 0.1f, 0.0f});
+  const OneRecord record(recordAt(Vec3::Zero(), Vec3::UnitZ(), 1));
+  const GuidedDensity density(diffuse, record.packed, {0.9f, 0.1f, 0.0f});
   // Background 0.3 of the product is the BSDF's own sampling: 0.1 + 0.9·0.3.
   CHECK(density.bsdfShare() == Approx(0.37f));
   const Vec3 wi = Vec3(0.3f, 0.1f, 0.9f).normalized();
-  CHECK(density.guidedPdf(wi) == Approx(0.9f * 0.7f * mixturePdf(record.gaussians(), toDisc(wi)) / 2));
+  CHECK(density.guidedPdf(wi) ==
+        Approx(0.9f * 0.7f * mixturePdf(recordAt(Vec3::Zero(), Vec3::UnitZ(), 1).gaussians(), toDisc(wi)) / 2));
 }

@@ -8,6 +8,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "runtime/mixture/lane_kernels.h"
+#include "runtime/mixture/lane_packing.h"
 #include "runtime/mixture/lookup.h"
 
 namespace lobe {
@@ -35,8 +37,15 @@ LobeCache openFor(const std::filesystem::path& folder, const LobeRequest& reques
 BrdfCaches::Entry::Entry(LobeCache opened)
     : cache(std::move(opened)),
       grid{static_cast<GridKind>(cache.info().gridKind), static_cast<int>(cache.info().gridCount)} {
-  for (const CacheRecord& record : cache.records())
-    references.push_back(toDisc(grid.direction(static_cast<int>(record.entry))));
+  for (const CacheRecord& r : cache.records()) {
+    const std::span<const Gaussian> fitted = asGaussians(cache.components(r));
+    const int count = static_cast<int>(fitted.size()), stride = paddedLanes(count);
+    records.push_back({toDisc(grid.direction(static_cast<int>(r.entry))), lanes.size(), stride, count,
+                       r.integral / std::max(1.0f - r.outside, 0.1f), r.albedo, r.cosineMass});
+    lanes.resize(lanes.size() + static_cast<std::size_t>(stride) * kLaneFields);
+    packLanes(fitted, lanes.data() + records.back().first, stride);
+  }
+  lanes.resize(lanes.size() + kMostLanes);  // kernels read whole sets of lanes
 }
 
 BrdfCaches::BrdfCaches(const std::filesystem::path& folder, std::span<const LobeRequest> requests,
@@ -64,30 +73,23 @@ BrdfCaches::BrdfCaches(const std::filesystem::path& folder, std::span<const Lobe
 
 void BrdfCaches::add(int lobe, const Vec3& wo, const Vec2& turn, float tint, Reflectance& reflectance) const {
   const Entry& entry = caches_[cacheOfRequest_[lobe]];
-  const bool isotropic = entry.grid.kind == GridKind::elevation;
-  const auto turned = [&](const Vec3& w) {
-    return Vec3(turn.x() * w.x() - turn.y() * w.y(), turn.y() * w.x() + turn.x() * w.y(), w.z());
-  };
-  // An isotropic lobe can be looked up in the frame wanted; an anisotropic one knows its tangent and is turned after.
-  const Vec3 query = isotropic ? turned(wo) : wo;
-  const Mirror mirror = entry.cache.info().quarter ? Mirror::intoQuadrant(query) : Mirror{};
-  const std::uint32_t found = entry.cache.lookup(static_cast<std::uint32_t>(entry.grid.nearest(mirror(query))));
-  const CacheRecord& record = entry.cache.records()[found];
-  const std::span<const Gaussian> fitted = asGaussians(entry.cache.components(record));
-  const std::span<Gaussian> room = std::span(reflectance.components).subspan(reflectance.count);
-  const bool covered = !fitted.empty() && fitted.size() <= room.size();
+  const Mirror mirror = entry.cache.info().quarter ? Mirror::intoQuadrant(wo) : Mirror{};
+  const auto& record = entry.records[entry.cache.lookup(static_cast<std::uint32_t>(entry.grid.nearest(mirror(wo))))];
+  const bool covered = record.count > 0 && record.count <= reflectance.gaussians.room();
   (covered ? reflectance.albedo : reflectance.uncoveredAlbedo) += tint * record.albedo;
   if (!covered) return;
 
+  Placement placement = placementOf({entry.grid.kind, record.reference, mirror}, wo);
+  // Turned once more, by the sum of both angles.
+  const float cosine = placement.cosine, sine = placement.sine;
+  placement.cosine = turn.x() * cosine - turn.y() * sine;
+  placement.sine = turn.y() * cosine + turn.x() * sine;
   // ρ = integral · G / 2, because dω = 2 dA, with G normalised over the disc: records are over the plane.
-  const float scale = 0.5f * tint * record.integral / std::max(1.0f - record.outside, 0.1f);
-  const Alignment alignment{entry.grid.kind, entry.references[found], mirror};
-  for (Gaussian& g : alignMixture(alignment, fitted, query, room)) {
-    if (!isotropic) g = rotated(g, turn);
-    g.weight *= scale;
-  }
-  reflectance.count += static_cast<int>(fitted.size());
-  reflectance.backgroundMass += scale * 2.0f * std::numbers::inv_pi_v<float> * record.cosineMass;
+  placement.factor = 0.5f * tint * record.integral;
+  auto& gaussians = reflectance.gaussians;
+  placeMixture(record.view(entry.lanes), placement, gaussians.data(), gaussians.kStride, gaussians.count());
+  gaussians.grow(record.count);
+  reflectance.backgroundMass += placement.factor * 2.0f * std::numbers::inv_pi_v<float> * record.cosineMass;
 }
 
 std::size_t BrdfCaches::bytes() const {

@@ -9,6 +9,7 @@
 
 #include "runtime/guiding/reflectance.h"
 #include "runtime/mixture/grid.h"
+#include "runtime/mixture/lanes.h"
 #include "schema/lobe_cache.h"
 
 namespace lobe {
@@ -37,11 +38,23 @@ class BrdfCaches {
   std::vector<std::uint64_t> hashes() const;
 
  private:
+  /// A record as it is looked up.
+  struct Record {
+    Vec2 reference;     ///< the direction that it was fitted for, on the disc
+    std::size_t first;  ///< of its lanes
+    int stride, count;
+    float integral;  ///< over the plane: what the components' weights are to be multiplied by for ∫ ρ dω
+    float albedo, cosineMass;
+
+    /// The view of its components.
+    LanesView view(const std::vector<float>& lanes) const { return {lanes.data() + first, stride, count}; }
+  };
   struct Entry {
     Entry(LobeCache opened);
     LobeCache cache;
     DirectionGrid grid;
-    std::vector<Vec2> references;  ///< the directions that records were fitted for, on the disc
+    std::vector<Record> records;
+    std::vector<float> lanes;  ///< of all records
   };
   std::vector<Entry> caches_;
   std::vector<int> cacheOfRequest_;

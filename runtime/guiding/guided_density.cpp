@@ -27,14 +27,14 @@ Vec3 sampleCosine(const Vec2& u) {
 
 }  // namespace
 
-GuidedDensity::GuidedDensity(const Reflectance& reflectance, const IlluminationRecord& illumination,
+GuidedDensity::GuidedDensity(const Reflectance& reflectance, const PackedRecord& illumination,
                              const StrategyShares& shares)
     : reflectance_(reflectance),
       illumination_(illumination),
       bsdfShare_(shares.bsdf + shares.product),
       illuminationShare_(shares.illumination) {
   if (shares.product <= 0) return;
-  product_.emplace(reflectance.gaussians(), reflectance.constant, illumination.gaussians());
+  product_.emplace(reflectance.gaussians.view(), reflectance.constant, illumination.lanes());
   const float background = illumination.background * reflectance.backgroundMass;
   const float gaussian = (1.0f - illumination.background) * product_->mass();
   reflected_ = background + gaussian;
@@ -57,7 +57,7 @@ std::optional<Vec3> GuidedDensity::sample(Strategy strategy, float choice, const
     y = product_->sample(choice, u);
   } else {
     if (take(choice, illumination_.background)) return sampleCosine(u);
-    y = sampleMixture(illumination_.gaussians(), choice, u);
+    y = sampleLanes(illumination_.lanes(), choice, u);
   }
   if (!insideDisc(y)) return std::nullopt;
   return fromDisc(y);
@@ -66,13 +66,15 @@ std::optional<Vec3> GuidedDensity::sample(Strategy strategy, float choice, const
 float GuidedDensity::guidedPdf(const Vec3& wi) const {
   if (wi.z() <= 0) return 0;
   const Vec2 y = toDisc(wi);
-  const float light = mixturePdf(illumination_.gaussians(), y);
   const float background = illumination_.background * kTwoOverPi * wi.z();
-  float pdf = illuminationShare_ * (background + (1.0f - illumination_.background) * light);
-  // The product's density is G1(y) G2(y) / Z; light is G2 already.
+  Densities at{0, 0};
   if (productScale_ > 0)
-    pdf += productScale_ * light * (reflectance_.constant + mixturePdf(reflectance_.gaussians(), y));
-  return 0.5f * pdf;  // dω = 2 dA
+    at = densities(reflectance_.gaussians.view(), illumination_.lanes(), y.x(), y.y());
+  else
+    at.light = lightDensity(illumination_.lanes(), y.x(), y.y());
+  // The product's density is G1(y) G2(y) / Z.
+  return 0.5f * (illuminationShare_ * (background + (1.0f - illumination_.background) * at.light) +
+                 productScale_ * (reflectance_.constant + at.reflectance) * at.light);  // dω = 2 dA
 }
 
 }  // namespace lobe

@@ -11,6 +11,7 @@
 
 #include "runtime/guiding/illumination_cache.h"
 #include "runtime/guiding/reflectance.h"
+#include "runtime/mixture/product.h"
 
 namespace lobe {
 
@@ -31,7 +32,7 @@ enum class Strategy { bsdf, product, illumination };
 class GuidedDensity {
  public:
   /// Views both; they outlive it. Where the product has no mass its share goes to the BSDF.
-  GuidedDensity(const Reflectance& reflectance, const IlluminationRecord& illumination, const StrategyShares& shares);
+  GuidedDensity(const Reflectance& reflectance, const PackedRecord& illumination, const StrategyShares& shares);
 
   /// ∫ ρ p_L dA, what the reflectance given makes of one unit of irradiance; 0 without a product (shares.product 0).
   float reflected() const { return reflected_; }
@@ -50,7 +51,7 @@ class GuidedDensity {
 
  private:
   const Reflectance& reflectance_;
-  const IlluminationRecord& illumination_;
+  const PackedRecord& illumination_;
   std::optional<Product> product_;
   float bsdfShare_;
   float reflected_ = 0;

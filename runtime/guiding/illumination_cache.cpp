@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <new>
+
+#include "runtime/mixture/lane_packing.h"
 
 namespace lobe {
 namespace {
@@ -20,15 +23,16 @@ std::size_t slotOf(std::uint64_t key, std::size_t tableSize) {
 
 }  // namespace
 
-IlluminationCache::IlluminationCache(std::vector<IlluminationRecord> records, float unit)
-    : records_(std::move(records)), unit_(unit), inverseCellSize_(kCellsPerUnit / unit) {
+IlluminationCache::IlluminationCache(const std::vector<IlluminationRecord>& records, float unit)
+    : unit_(unit), inverseCellSize_(kCellsPerUnit / unit) {
+  for (const IlluminationRecord& record : records) pack(record);
   struct Placement {
     std::uint64_t key;
     std::uint32_t record;
   };
   std::vector<Placement> placements;
-  for (std::uint32_t i = 0; i < records_.size(); ++i) {
-    const IlluminationRecord& r = records_[i];
+  for (std::uint32_t i = 0; i < places_.size(); ++i) {
+    const Place& r = places_[i];
     const Eigen::Vector3i low = cellOf(r.position - Vec3::Constant(r.radius), inverseCellSize_);
     const Eigen::Vector3i high = cellOf(r.position + Vec3::Constant(r.radius), inverseCellSize_);
     for (int z = low.z(); z <= high.z(); ++z)
@@ -43,13 +47,39 @@ IlluminationCache::IlluminationCache(std::vector<IlluminationRecord> records, fl
     const std::uint64_t key = placements[i].key;
     const auto begin = static_cast<std::uint32_t>(entries_.size());
     for (; i < placements.size() && placements[i].key == key; ++i) {
-      const IlluminationRecord& r = records_[placements[i].record];
-      entries_.push_back({r.position, r.normal, r.radius * r.radius, placements[i].record});
+      const Place& r = places_[placements[i].record];
+      entries_.push_back({r.position, r.normal, r.radius * r.radius, r.block});
     }
     std::size_t slot = slotOf(key, table_.size());
     while (table_[slot].begin != table_[slot].end) slot = (slot + 1) & (table_.size() - 1);
     table_[slot] = {key, begin, static_cast<std::uint32_t>(entries_.size())};
   }
+}
+
+void IlluminationCache::pack(const IlluminationRecord& record) {
+  static_assert(sizeof(PackedRecord) == sizeof(Block) && kMaxLightComponents == 8);
+  const int stride = record.count <= kLaneStep ? kLaneStep : kMaxLightComponents;
+  const std::size_t first = blocks_.size();
+  const auto index = static_cast<std::uint32_t>(places_.size());
+  places_.push_back({record.position, record.normal, record.radius, static_cast<std::uint32_t>(first)});
+  blocks_.resize(first + 1 + static_cast<std::size_t>(stride) * kLaneFields / std::size(Block{}.floats));
+  new (&blocks_[first]) PackedRecord{record.tangent, record.background, record.samples, record.count, stride, index};
+  packLanes(record.gaussians(), blocks_[first + 1].floats.data(), stride);
+}
+
+IlluminationRecord IlluminationCache::unpacked(const PackedRecord& record) const {
+  const Place& place = places_[record.index];
+  IlluminationRecord r{place.position,    place.normal,   record.tangent, place.radius,
+                       record.background, record.samples, record.count,   {}};
+  std::ranges::copy(unpackLanes(record.lanes()), r.components.begin());
+  return r;
+}
+
+std::vector<IlluminationRecord> IlluminationCache::records() const {
+  std::vector<IlluminationRecord> all;
+  all.reserve(places_.size());
+  for (const Place& place : places_) all.push_back(unpacked(at(place.block)));
+  return all;
 }
 
 std::uint64_t IlluminationCache::cellKey(const Eigen::Vector3i& cell) const {
@@ -68,10 +98,10 @@ const IlluminationCache::Cell* IlluminationCache::findCell(std::uint64_t key) co
   }
 }
 
-const IlluminationRecord* IlluminationCache::find(const Vec3& x, const Vec3& n) const {
+const PackedRecord* IlluminationCache::find(const Vec3& x, const Vec3& n) const {
   const Cell* cell = findCell(cellKey(cellOf(x, inverseCellSize_)));
   if (!cell) return nullptr;
-  const IlluminationRecord* best = nullptr;
+  const Entry* best = nullptr;
   float bestCost = std::numeric_limits<float>::infinity();
   for (std::uint32_t i = cell->begin; i < cell->end; ++i) {
     const Entry& e = entries_[i];
@@ -81,14 +111,15 @@ const IlluminationRecord* IlluminationCache::find(const Vec3& x, const Vec3& n) 
     const float cost = std::sqrt(distance2) / unit_ + 2.0f * std::sqrt(std::max(0.0f, 1.001f - cosine));
     if (cost < bestCost) {
       bestCost = cost;
-      best = &records_[e.record];
+      best = &e;
     }
   }
-  return best;
+  return best ? &at(best->block) : nullptr;
 }
 
 std::size_t IlluminationCache::bytes() const {
-  return records_.size() * sizeof(IlluminationRecord) + entries_.size() * sizeof(Entry) + table_.size() * sizeof(Cell);
+  return places_.size() * sizeof(Place) + blocks_.size() * sizeof(Block) + entries_.size() * sizeof(Entry) +
+         table_.size() * sizeof(Cell);
 }
 
 }  // namespace lobe

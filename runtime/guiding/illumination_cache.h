@@ -10,11 +10,12 @@
 #include <Eigen/Geometry>
 
 #include "runtime/mixture/gaussian.h"
-#include "runtime/mixture/product.h"
+#include "runtime/mixture/lanes.h"
 
 namespace lobe {
 
-/// u · 2cosθ/π + (1−u) · Σ π_k N_k over the disc of the frame (tangent, normal × tangent, normal).
+/// u · 2cosθ/π + (1−u) · Σ π_k N_k over the disc of the frame (tangent, normal × tangent, normal). The plain form, in
+/// which records are made and stored.
 struct IlluminationRecord {
   Vec3 position;
   Vec3 normal;       ///< unit
@@ -24,22 +25,38 @@ struct IlluminationRecord {
   float irradiance;  ///< ∫ L cosθ, from all light, in units that are the same for all records; 0: not known
   float samples;     ///< particles seen in training
   std::int32_t count = 0;
-  std::array<Gaussian, kMaxIlluminationComponents / 2> components;  ///< weights sum to 1
+  std::array<Gaussian, kMaxLightComponents> components;  ///< weights sum to 1
 
   std::span<const Gaussian> gaussians() const { return {components.data(), static_cast<std::size_t>(count)}; }
+};
+
+/// What sampling needs of a record, in one run of memory: the Gaussians' lanes follow the header.
+struct alignas(32) PackedRecord {
+  Vec3 tangent;
+  float background;
+  float samples;
+  std::int32_t count;   ///< Gaussians
+  std::int32_t stride;  ///< 4 or 8 lanes
+  std::uint32_t index;  ///< of the record, as it was given
+
+  LanesView lanes() const { return {reinterpret_cast<const float*>(this + 1), stride, count}; }
 };
 
 class IlluminationCache {
  public:
   IlluminationCache() = default;
   /// unit: the length that radii are clamped to (see TrainingOptions), > 0.
-  IlluminationCache(std::vector<IlluminationRecord> records, float unit);
+  IlluminationCache(const std::vector<IlluminationRecord>& records, float unit);
 
   /// The valid record of least |x−x_j|/unit + 2 sqrt(1.001 − n·n_j): within its radius and about 41° of its normal. n
   /// is the unit geometric normal on the side asked for. nullptr: none, the BSDF is to be sampled.
-  const IlluminationRecord* find(const Vec3& x, const Vec3& n) const;
+  const PackedRecord* find(const Vec3& x, const Vec3& n) const;
 
-  std::span<const IlluminationRecord> records() const { return records_; }
+  std::size_t size() const { return places_.size(); }
+  /// A record of this cache as it was given, to the bit.
+  IlluminationRecord unpacked(const PackedRecord& record) const;
+  /// All records as they were given.
+  std::vector<IlluminationRecord> records() const;
   std::size_t bytes() const;
 
  private:
@@ -48,16 +65,29 @@ class IlluminationCache {
     Vec3 position;
     Vec3 normal;
     float radius2;
-    std::uint32_t record;
+    std::uint32_t block;  // where its record begins
   };
   struct Cell {
     std::uint64_t key;
     std::uint32_t begin, end;
   };
+  // What only the look-up's making and unpacking need.
+  struct Place {
+    Vec3 position;
+    Vec3 normal;
+    float radius;
+    std::uint32_t block;
+  };
+  struct alignas(32) Block {
+    std::array<float, 8> floats;
+  };
+  void pack(const IlluminationRecord& record);
+  const PackedRecord& at(std::uint32_t block) const { return reinterpret_cast<const PackedRecord&>(blocks_[block]); }
   std::uint64_t cellKey(const Eigen::Vector3i& cell) const;
   const Cell* findCell(std::uint64_t key) const;
 
-  std::vector<IlluminationRecord> records_;
+  std::vector<Place> places_;
+  std::vector<Block> blocks_;  // records, each of as many blocks as it needs
   float unit_ = 1;
   float inverseCellSize_ = 1;
   std::vector<Entry> entries_;

@@ -186,7 +186,7 @@ void IlluminationTrainer::rebuildCache() {
     r.count = static_cast<std::int32_t>(t.em.gaussians().size());
     std::ranges::copy(t.em.gaussians(), r.components.begin());
   }
-  cache_ = IlluminationCache(std::move(records), unit_);
+  cache_ = IlluminationCache(records, unit_);
 }
 
 double IlluminationTrainer::undersampledShare() const {

@@ -1,11 +1,7 @@
 #pragma once
 // The reflectance of one surface point for one outgoing direction, in the form that the product needs.
 
-#include <array>
-#include <span>
-
-#include "runtime/mixture/gaussian.h"
-#include "runtime/mixture/product.h"
+#include "runtime/mixture/lane_packing.h"
 
 namespace lobe {
 
@@ -16,10 +12,7 @@ struct Reflectance {
   float backgroundMass = 0;
   float albedo = 0;           ///< of all that the other fields describe
   float uncoveredAlbedo = 0;  ///< of lobes that they do not describe
-  int count = 0;
-  std::array<Gaussian, kMaxReflectanceComponents> components;
-
-  std::span<const Gaussian> gaussians() const { return {components.data(), static_cast<std::size_t>(count)}; }
+  LaneStore<kMaxReflectanceComponents> gaussians;
 };
 
 }  // namespace lobe

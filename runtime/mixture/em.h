@@ -8,6 +8,9 @@
 
 namespace lobe {
 
+/// The most Gaussians that a mixture in training may have.
+inline constexpr int kMaxIlluminationComponents = 16;
+
 struct WeightedPoint {
   Vec2 y;
   float weight;  ///< ≥ 0 and finite; points of weight 0 are ignored

@@ -53,4 +53,23 @@ std::span<Gaussian> alignMixture(const Alignment& alignment, std::span<const Gau
   return out;
 }
 
+Placement placementOf(const Alignment& alignment, const Vec3& wo) {
+  Placement p;
+  const Vec2& reference = alignment.reference;
+  const Vec2 to = toDisc(wo);
+  if (alignment.kind == GridKind::elevation) {
+    // At the azimuth 0 the step is along x; turning comes last.
+    const Vec2 azimuth = azimuthOf(wo);
+    p.stepX = reference.x() - to.norm();
+    p.cosine = azimuth.x();
+    p.sine = azimuth.y();
+  } else {
+    p.mirrorX = alignment.mirror.x ? -1.0f : 1.0f;
+    p.mirrorY = alignment.mirror.y ? -1.0f : 1.0f;
+    p.stepX = p.mirrorX * reference.x() - to.x();
+    p.stepY = p.mirrorY * reference.y() - to.y();
+  }
+  return p;
+}
+
 }  // namespace lobe

@@ -5,6 +5,7 @@
 
 #include "runtime/mixture/gaussian.h"
 #include "runtime/mixture/grid.h"
+#include "runtime/mixture/lane_kernels.h"
 
 namespace lobe {
 
@@ -28,5 +29,8 @@ struct Alignment {
 /// returns what was written. No allocation. (Herholz et al. 2016, Section 4; the sign is tested by NEV.)
 std::span<Gaussian> alignMixture(const Alignment& alignment, std::span<const Gaussian> components, const Vec3& wo,
                                  std::span<Gaussian> out);
+
+/// The same for placeMixture, with a factor of 1.
+Placement placementOf(const Alignment& alignment, const Vec3& wo);
 
 }  // namespace lobe

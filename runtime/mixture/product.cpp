@@ -1,93 +1,98 @@
 #include "runtime/mixture/product.h"
 
+#include <cmath>
 #include <limits>
-#include <numeric>
-#include <stdexcept>
-
-#include "runtime/mixture/normal_kernel.h"
+#include <numbers>
 
 namespace lobe {
-
 namespace {
 
-// Σ1 S⁻¹ as a full matrix, S = Σ1 + Σ2. In double: it is done once a sample, and it keeps Σ1 S⁻¹ Σ2 positive definite.
-struct Gain {
-  double a, b, c, d;
-};
-
-Gain gain(const Covariance& one, const Covariance& two) {
-  const double sxx = static_cast<double>(one.xx) + two.xx, sxy = static_cast<double>(one.xy) + two.xy,
-               syy = static_cast<double>(one.yy) + two.yy;
-  const double inverse = 1 / (sxx * syy - sxy * sxy);
-  return {(one.xx * syy - one.xy * sxy) * inverse, (one.xy * sxx - one.xx * sxy) * inverse,
-          (one.xy * syy - one.yy * sxy) * inverse, (one.yy * sxx - one.xy * sxy) * inverse};
+/// Two independent draws of N(0, 1) (Box–Muller).
+Vec2 standardNormal(const Vec2& u) {
+  const float radius = std::sqrt(-2.0f * std::log(1.0f - u.x()));
+  const float angle = 2.0f * std::numbers::pi_v<float> * u.y();
+  return {radius * std::cos(angle), radius * std::sin(angle)};
 }
 
-// The normalised product of two components: μ = Σ1 S⁻¹ μ2 + Σ2 S⁻¹ μ1 = μ1 + Σ1 S⁻¹ (μ2 − μ1) and Σ = Σ1 S⁻¹ Σ2.
-Gaussian pairProduct(const Gaussian& one, const Gaussian& two) {
-  const Gain k = gain(one.cov, two.cov);
-  const double dx = static_cast<double>(two.meanX) - one.meanX, dy = static_cast<double>(two.meanY) - one.meanY;
-  return {1.0f, static_cast<float>(one.meanX + k.a * dx + k.b * dy),
-          static_cast<float>(one.meanY + k.c * dx + k.d * dy),
-          Covariance{static_cast<float>(k.a * two.cov.xx + k.b * two.cov.xy),
-                     static_cast<float>(k.a * two.cov.xy + k.b * two.cov.yy),
-                     static_cast<float>(k.c * two.cov.xy + k.d * two.cov.yy)}};
+/// The component whose share `left` falls in, with `left` then counted from where that share begins. Rounding may leave
+/// a little at the end: then it is the last that has a share.
+template <class Share>
+int choose(int count, float& left, const Share& share) {
+  int chosen = 0;
+  float before = left;
+  for (int k = 0; k < count; ++k) {
+    const float mass = share(k);
+    if (!(mass > 0)) continue;
+    chosen = k;
+    before = left;
+    if (left < mass) break;
+    left -= mass;
+  }
+  left = before;
+  return chosen;
 }
 
-// The illumination's components side by side, so that the loop over them vectorises.
-struct Columns {
-  std::array<float, kMaxIlluminationComponents> weight, x, y, xx, xy, yy;
-  explicit Columns(std::span<const Gaussian> mixture) {
-    for (std::size_t j = 0; j < mixture.size(); ++j) {
-      const Gaussian& g = mixture[j];
-      weight[j] = g.weight, x[j] = g.meanX, y[j] = g.meanY, xx[j] = g.cov.xx, xy[j] = g.cov.xy, yy[j] = g.cov.yy;
-    }
+/// One component by the numbers that a product is made of; d is the variance of y at a given x.
+struct Factor {
+  float x, y, slope, xx, d;
+  Factor(const LanesView& mixture, int k) {
+    const auto at = [&](LaneField f) { return mixture.field(f)[k]; };
+    x = at(LaneField::x), y = at(LaneField::y), slope = at(LaneField::slope), xx = at(LaneField::xx);
+    d = -kHalfLog2e / at(LaneField::across);
   }
+  float ridge(float px) const { return y + slope * (px - x); }
 };
 
-// a b_j N(μ − μ_j | 0, Σ + Σ_j) for all j.
-void pairWeights(const Gaussian& one, const Columns& two, std::size_t count, float* pairs) {
-  const Gaussian g = one;  // a copy: `pairs` might alias the original
-  for (std::size_t j = 0; j < count; ++j) {
-    const Covariance sum{g.cov.xx + two.xx[j], g.cov.xy + two.xy[j], g.cov.yy + two.yy[j]};
-    pairs[j] = g.weight * two.weight[j] * centredNormal(g.meanX - two.x[j], g.meanY - two.y[j], sum);
-  }
+/// A point of the normalised product of two components. With the Cholesky factors the product's density of x, then that
+/// of y at this x, are products of Gaussians of one variable: all sums are of positive terms, so that floats will do.
+Vec2 samplePair(const Factor& one, const Factor& two, const Vec2& normal) {
+  const float apart = two.x - one.x, bend = one.slope - two.slope, across = one.d + two.d;
+  const float wide = one.xx * two.xx;
+  const float determinant = (one.xx + two.xx) * across + wide * (bend * bend);
+  const float gap = one.y - two.ridge(one.x);  // between the ridges at one.x
+  const float inverse = 1.0f / determinant;
+  const float shift = (one.xx * across * apart - wide * bend * gap) * inverse;
+  const float x = one.x + shift + std::sqrt(wide * across * inverse) * normal.x();
+  const float share = one.d / across;
+  const float ridge = one.ridge(x) + share * (two.ridge(x) - one.ridge(x));
+  return {x, ridge + std::sqrt(share * two.d) * normal.y()};
 }
 
 }  // namespace
 
-Product::Product(std::span<const Gaussian> reflectance, float constant, std::span<const Gaussian> illumination)
-    : reflectance_(reflectance), illumination_(illumination), constant_(constant) {
-  if (reflectance.size() > kMaxReflectanceComponents || illumination.size() > kMaxIlluminationComponents)
-    throw std::runtime_error("a product's factor has too many components");
-  const std::size_t stride = illumination.size();
-  const Columns columns(illumination);
-  for (std::size_t i = 0; i < reflectance.size(); ++i)
-    pairWeights(reflectance[i], columns, stride, &pairs_[i * stride]);
-  for (std::size_t j = 0; j < stride; ++j) pairs_[reflectance.size() * stride + j] = constant * illumination[j].weight;
-  const float sum = std::accumulate(pairs_.begin(), pairs_.begin() + (reflectance.size() + 1) * stride, 0.0f);
+Vec2 sampleLane(const LanesView& mixture, int k, const Vec2& u) {
+  const Factor g(mixture, k);
+  const Vec2 normal = standardNormal(u);
+  const float x = g.x + std::sqrt(g.xx) * normal.x();
+  return {x, g.ridge(x) + std::sqrt(g.d) * normal.y()};
+}
+
+Vec2 sampleLanes(const LanesView& mixture, float choice, const Vec2& u) {
+  const float* weights = mixture.field(LaneField::weight);
+  float left = 0;
+  for (int k = 0; k < mixture.count; ++k) left += weights[k];
+  left *= choice;
+  return sampleLane(mixture, choose(mixture.count, left, [&](int k) { return weights[k]; }), u);
+}
+
+Product::Product(const LanesView& reflectance, float constant, const LanesView& light)
+    : reflectance_(reflectance), light_(light), constant_(constant) {
+  const float sum = pairMasses(reflectance, constant, light, pairs_.data(), columns_.data());
   // The comparison is false for NaN as well.
   mass_ = sum >= kMinMass && sum < std::numeric_limits<float>::infinity() ? sum : 0.0f;
 }
 
 Vec2 Product::sample(float choice, const Vec2& u) const {
-  const std::size_t stride = illumination_.size(), count = (reflectance_.size() + 1) * stride;
   float left = choice * mass_;
-  // Rounding may leave a little at the end: then the last pair that has weight is taken.
-  std::size_t chosen = 0;
-  for (std::size_t k = 0; k < count; ++k) {
-    if (pairs_[k] <= 0) continue;
-    chosen = k;
-    if (left < pairs_[k]) break;
-    left -= pairs_[k];
-  }
-  const Gaussian& two = illumination_[chosen % stride];
-  if (chosen / stride == reflectance_.size()) return sampleNormal(two, u);
-  return sampleNormal(pairProduct(reflectance_[chosen / stride], two), u);
+  const int j = choose(light_.count, left, [&](int k) { return columns_[k]; });
+  const int i = choose(reflectance_.count + 1, left, [&](int k) { return pairs_[k * light_.stride + j]; });
+  if (i == reflectance_.count) return sampleLane(light_, j, u);
+  return samplePair(Factor(reflectance_, i), Factor(light_, j), standardNormal(u));
 }
 
 float Product::pdf(const Vec2& y) const {
-  return (constant_ + mixturePdf(reflectance_, y)) * (mixturePdf(illumination_, y) / mass_);
+  const Densities at = densities(reflectance_, light_, y.x(), y.y());
+  return (constant_ + at.reflectance) * (at.light / mass_);
 }
 
 }  // namespace lobe

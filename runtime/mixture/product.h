@@ -1,30 +1,34 @@
 #pragma once
-// The product of a reflectance mixture and an illumination mixture, evaluated lazily (Herholz et al. 2016, Appendix A;
-// right form of Eq. 9). Scalar reference form.
+// The product of a reflectance mixture and a mixture of light, evaluated lazily (Herholz et al. 2016, Appendix A; right
+// form of Eq. 9).
 //
 // With G1 = constant + Σ a_i N_i (unnormalised reflectance) and G2 = Σ b_j N_j, the product G1·G2 has the mass
 //   Z = constant Σ b_j + Σ_ij a_i b_j N(μ_i − μ_j | 0, Σ_i + Σ_j),
 // and p(y) = G1(y) G2(y) / Z exactly, so only the chosen pair's mean and covariance are ever formed.
 
 #include <array>
-#include <span>
 
-#include "runtime/mixture/gaussian.h"
+#include "runtime/mixture/disc.h"
+#include "runtime/mixture/lane_kernels.h"
 
 namespace lobe {
-
-/// Largest component counts of the two factors; more is refused when a cache or record is made.
-inline constexpr int kMaxReflectanceComponents = 32;
-inline constexpr int kMaxIlluminationComponents = 16;
 
 /// A product of less mass counts as none: its factors' densities would lose digits to underflow.
 inline constexpr float kMinMass = 1e-30f;
 
+/// A point of component k of the mixture, from u uniform in [0,1)².
+Vec2 sampleLane(const LanesView& mixture, int k, const Vec2& u);
+
+/// Chooses a component in proportion to its weight with `choice` uniform in [0,1), then samples it. The weights have a
+/// positive sum.
+Vec2 sampleLanes(const LanesView& mixture, float choice, const Vec2& u);
+
 /// The product density of one pair of factors. Views the factors; they outlive it. No allocation.
 class Product {
  public:
-  /// constant ≥ 0 is the height of a flat term added to the reflectance. Throws if a factor has too many components.
-  Product(std::span<const Gaussian> reflectance, float constant, std::span<const Gaussian> illumination);
+  /// Factors as lane_kernels.h wants them, of at most kMaxReflectanceComponents and kMaxLightComponents components.
+  /// constant ≥ 0 is the height of a flat term added to the reflectance.
+  Product(const LanesView& reflectance, float constant, const LanesView& light);
 
   /// Z; 0 when it is below kMinMass or not finite: then there is no product, and neither sample nor pdf may be called.
   float mass() const { return mass_; }
@@ -36,12 +40,12 @@ class Product {
   float pdf(const Vec2& y) const;
 
  private:
-  std::span<const Gaussian> reflectance_;
-  std::span<const Gaussian> illumination_;
+  LanesView reflectance_, light_;
   float constant_;
   float mass_ = 0;
-  /// Weights of all pairs, illumination fastest (K2·k1 + k2); the last row is the constant's.
-  std::array<float, std::size_t{kMaxReflectanceComponents + 1} * kMaxIlluminationComponents> pairs_;
+  std::array<float, kMaxLightComponents> columns_;  // masses by the light's component
+  /// Masses of all pairs, the light's components fastest; the last row is the constant's.
+  std::array<float, std::size_t{kMaxReflectanceComponents + 1} * kMaxLightComponents> pairs_;
 };
 
 }  // namespace lobe

@@ -9,7 +9,6 @@
 #include "runtime/mixture/eigenvalue_floor.h"
 #include "runtime/mixture/em.h"
 #include "runtime/mixture/fast_exp.h"
-#include "runtime/mixture/product.h"
 #include "runtime/mixture/random.h"
 
 namespace lobe {

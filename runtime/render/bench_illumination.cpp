@@ -139,7 +139,7 @@ nlohmann::ordered_json row(const Exam& exam, const Trained& trained) {
   json.update(grade(exam, trained.illumination.cache));
   json["seconds"] = trained.illumination.report.seconds;
   json["particles"] = trained.illumination.report.particles();
-  json["records"] = trained.illumination.cache.records().size();
+  json["records"] = trained.illumination.cache.size();
   json["record_bytes"] = trained.illumination.cache.bytes();
   return json;
 }

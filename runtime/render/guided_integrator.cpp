@@ -16,7 +16,7 @@ SamplingStrategy asCounted(Strategy strategy) {
 
 /// The frame in which both factors of the product are given, as seen from the shading frame: z is the shading normal on
 /// the side of wo, x the record's tangent made orthogonal to it. So records need no turning on flat surfaces.
-Eigen::Matrix3f guideAxes(const SurfaceHit& hit, const IlluminationRecord& record, float side) {
+Eigen::Matrix3f guideAxes(const SurfaceHit& hit, const PackedRecord& record, float side) {
   const Vec3 tangent = hit.frame.toLocal(record.tangent);
   const float length = tangent.head<2>().norm();
   const Vec2 x = length > 1e-4f ? Vec2(tangent.head<2>() / length) : Vec2(Vec2::UnitX());
@@ -58,7 +58,7 @@ GuidedSampler::GuidedSampler(const Scene& scene, const IlluminationCache& illumi
 
 GuidedSampler::Vertex::Vertex(const GuidedSampler& sampler, const SurfaceHit& hit) : hit_(hit) {
   const float side = hit.wo.z() >= 0 ? 1.0f : -1.0f;
-  const IlluminationRecord* record = sampler.illumination_.find(hit.position, side * hit.normal);
+  const PackedRecord* record = sampler.illumination_.find(hit.position, side * hit.normal);
   if (!record) return;
   axes_ = guideAxes(hit, *record, side);
   const LobeMixture mixture = hit.bsdf->mixture(hit.wo, hit.uv);

@@ -47,7 +47,7 @@ Rgb coveredEmission(const RenderScene& scene, const Receiver& receiver, const Ra
 }
 
 /// Without a reflectance the guided part of the density is the illumination's alone.
-GuidedDensity guidedDensity(const IlluminationRecord& record) {
+GuidedDensity guidedDensity(const PackedRecord& record) {
   static const Reflectance none{};
   return {none, record, kGuidedShares};
 }

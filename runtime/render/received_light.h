@@ -45,7 +45,7 @@ class ServedDensity {
  public:
   ServedDensity(const IlluminationCache& cache, const Receiver& receiver);
 
-  const IlluminationRecord* record() const { return record_; }
+  const PackedRecord* record() const { return record_; }
   /// The mixture alone. Its mass outside the disc is missing.
   float mixture(const Vec3& wi) const;
   /// 0.5 cosθ/π + 0.5 mixture: what `guided` samples on a diffuse surface.
@@ -57,7 +57,7 @@ class ServedDensity {
   const Frame& frame() const { return frame_; }
 
  private:
-  const IlluminationRecord* record_;
+  const PackedRecord* record_;
   Frame frame_;
 };
 

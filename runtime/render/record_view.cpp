@@ -73,8 +73,8 @@ double degreesBetween(const Vec3& a, const Vec3& b) {
   return std::acos(std::clamp(a.dot(b), -1.0f, 1.0f)) * 180 / std::numbers::pi;
 }
 
-std::string captionOf(const Receiver& receiver, const ServedDensity& density, const ReceivedLight& light) {
-  const IlluminationRecord& record = *density.record();
+std::string captionOf(const Receiver& receiver, const ServedDensity& density, const IlluminationRecord& record,
+                      const ReceivedLight& light) {
   return fmt::format(
       "position {}  normal {}  radius {:.3g}  seen {:.3g} off, turned {:.0f}\n"
       "samples {:.0f}  gaussians {}  background {:.2f}  NEV {}  with half cosine {}",
@@ -132,7 +132,7 @@ RecordView viewRecord(const RenderScene& scene, const Receiver& receiver, const 
   const ServedDensity density(illumination.cache, receiver);
   if (!density.record())
     throw NoRecord(fmt::format("no record serves the point {} seen there", numbers(receiver.point.position)));
-  const IlluminationRecord& record = *density.record();
+  const IlluminationRecord record = illumination.cache.unpacked(*density.record());
 
   const Neighbourhood around = neighbourhoodOf(record, scene, illumination, options);
   Histogram particles, truth;
@@ -141,7 +141,7 @@ RecordView viewRecord(const RenderScene& scene, const Receiver& receiver, const 
   for (const ReceivedLight::Sample& s : light.samples())
     truth.add(toDisc(density.frame().toLocal(s.wi)), 0.5 * (s.first + s.second) / s.density);
 
-  RecordView view{paper(), captionOf(receiver, density, light)};
+  RecordView view{paper(), captionOf(receiver, density, record, light)};
   drawPanels(view.raster,
              {{{"mixture", [&](const Vec2& y) { return 2.0 * density.mixture(density.frame().toWorld(fromDisc(y))); }},
                {around.points.empty() ? "particles: none kept" : fmt::format("particles: {}", around.points.size()),

@@ -188,7 +188,7 @@ nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, c
           {"peak_rss_bytes", peakResidentBytes()},
           {"training_passes", passes},
           {"training_particles", run.training().particles()},
-          {"records", run.guiding.training.cache.records().size()},
+          {"records", run.guiding.training.cache.size()},
           {"records_undersampled_share", run.training().undersampledShare},
           {"record_bytes", run.guiding.training.cache.bytes()},
           {"lobe_bytes", run.guiding.caches ? run.guiding.caches->bytes() : 0},

@@ -57,7 +57,7 @@ class Training {
       importance_.learn(std::array{std::span<const Particle>(importons.importance)}, photons.requests);
     }
     PassReport report{0, photons_.size() + samples_.size(), 0, radiance_.learn(sources(), importons.requests)};
-    report.records = radiance_.cache().records().size();
+    report.records = radiance_.cache().size();
     report.seconds = watch.seconds();
     return report;
   }

@@ -1,0 +1,234 @@
+#include "runtime/mixture/lane_kernels.h"
+
+#include <array>
+#include <cstddef>
+#include <numbers>
+
+// Includes this file once for each instruction set.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "runtime/mixture/lane_kernels.cpp"
+#include <hwy/foreach_target.h>  // IWYU pragma: keep
+
+#include <hwy/highway.h>
+
+#include "runtime/mixture/lane_math-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace lobe::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+// The variance of y at a given x, for all components of a reflectance.
+void conditionalVariances(const LanesView& mixture, float* out) {
+  const hn::CappedTag<float, kMostLanes> d;
+  for (int k = 0; k < mixture.count; k += static_cast<int>(hn::Lanes(d)))
+    hn::StoreU(hn::Div(hn::Set(d, -kHalfLog2e), hn::LoadU(d, mixture.field(LaneField::across) + k)), d, out + k);
+}
+
+// The columns of one set of lanes of the light.
+template <class D>
+HWY_INLINE hn::Vec<D> pairColumns(D d, const LanesView& reflectance, const float* variances, float constant,
+                                  const LanesView& light, int first, float* pairs) {
+  const auto two = [&](LaneField f) { return hn::LoadU(d, light.field(f) + first); };
+  const auto x2 = two(LaneField::x), y2 = two(LaneField::y), slope2 = two(LaneField::slope), xx2 = two(LaneField::xx),
+             xy2 = two(LaneField::xy), weight2 = two(LaneField::weight);
+  const auto variance2 = hn::Div(hn::Set(d, -kHalfLog2e), two(LaneField::across));
+  auto sum = hn::Mul(hn::Set(d, constant), weight2);
+  hn::StoreU(sum, d, pairs + reflectance.count * light.stride + first);
+  for (int i = 0; i < reflectance.count; ++i) {
+    const auto one = [&](LaneField f) { return hn::Set(d, reflectance.field(f)[i]); };
+    const auto xx1 = one(LaneField::xx);
+    const auto sxx = hn::Add(xx1, xx2), sxy = hn::Add(one(LaneField::xy), xy2);
+    const auto bend = hn::Sub(one(LaneField::slope), slope2);
+    const auto determinant =
+        hn::MulAdd(hn::Add(hn::Set(d, variances[i]), variance2), sxx, hn::Mul(hn::Mul(xx1, xx2), hn::Mul(bend, bend)));
+    const auto dx = hn::Sub(one(LaneField::x), x2), dy = hn::Sub(one(LaneField::y), y2);
+    const auto across = hn::NegMulAdd(sxy, dx, hn::Mul(dy, sxx));  // (dy − slope dx) S_xx
+    const auto inverse = hn::Div(hn::Set(d, 1.0f), hn::Mul(sxx, determinant));
+    const auto square = hn::Mul(inverse, hn::MulAdd(across, across, hn::Mul(hn::Mul(dx, dx), determinant)));
+    const auto height = hn::Sqrt(hn::Mul(inverse, sxx));  // 1/sqrt|S|
+    const auto weight =
+        hn::Mul(hn::Set(d, reflectance.field(LaneField::weight)[i] * 0.5f * std::numbers::inv_pi_v<float>),
+                hn::Mul(weight2, height));
+    const auto mass = hn::Mul(weight, exp2Negative(d, hn::Mul(hn::Set(d, -kHalfLog2e), square)));
+    hn::StoreU(mass, d, pairs + i * light.stride + first);
+    sum = hn::Add(sum, mass);
+  }
+  return sum;
+}
+
+template <class D>
+HWY_INLINE float pairMassesBy(D d, const LanesView& reflectance, float constant, const LanesView& light, float* pairs,
+                              float* columns) {
+  HWY_ALIGN std::array<float, kMaxReflectanceComponents + kMostLanes> variances;
+  conditionalVariances(reflectance, variances.data());
+  auto total = hn::Zero(d);
+  for (int j = 0; j < light.stride; j += static_cast<int>(hn::Lanes(d))) {
+    const auto sum = pairColumns(d, reflectance, variances.data(), constant, light, j, pairs);
+    hn::StoreU(sum, d, columns + j);
+    total = hn::Add(total, sum);
+  }
+  return hn::GetLane(hn::SumOfLanes(d, total));
+}
+
+float PairMasses(const LanesView& reflectance, float constant, const LanesView& light, float* pairs, float* columns) {
+  if (light.stride == kLaneStep)
+    return pairMassesBy(hn::CappedTag<float, kLaneStep>(), reflectance, constant, light, pairs, columns);
+  return pairMassesBy(hn::CappedTag<float, kMostLanes>(), reflectance, constant, light, pairs, columns);
+}
+
+template <class D>
+HWY_INLINE hn::Vec<D> densityOf(D d, const LanesView& lanes, int first, hn::Vec<D> x, hn::Vec<D> y) {
+  const auto at = [&](LaneField f) { return hn::LoadU(d, lanes.field(f) + first); };
+  const auto dx = hn::Sub(x, at(LaneField::x));
+  const auto dy = hn::NegMulAdd(at(LaneField::slope), dx, hn::Sub(y, at(LaneField::y)));
+  const auto exponent =
+      hn::MulAdd(hn::Mul(dx, dx), at(LaneField::along), hn::Mul(hn::Mul(dy, dy), at(LaneField::across)));
+  return hn::Mul(at(LaneField::scale), exp2Negative(d, exponent));
+}
+
+template <class D>
+HWY_INLINE float lightDensityBy(D d, const LanesView& light, float px, float py) {
+  const auto x = hn::Set(d, px), y = hn::Set(d, py);
+  auto sum = hn::Zero(d);
+  for (int j = 0; j < light.stride; j += static_cast<int>(hn::Lanes(d)))
+    sum = hn::Add(sum, densityOf(d, light, j, x, y));
+  return hn::GetLane(hn::SumOfLanes(d, sum));
+}
+
+HWY_INLINE float lightDensityAt(const LanesView& light, float x, float y) {
+  if (light.stride == kLaneStep) return lightDensityBy(hn::CappedTag<float, kLaneStep>(), light, x, y);
+  return lightDensityBy(hn::CappedTag<float, kMostLanes>(), light, x, y);
+}
+
+template <class D>
+HWY_INLINE float reflectanceDensityBy(D d, const LanesView& reflectance, float px, float py) {
+  const auto x = hn::Set(d, px), y = hn::Set(d, py);
+  auto sum = hn::Zero(d);
+  for (int i = 0; i < reflectance.count; i += static_cast<int>(hn::Lanes(d))) {
+    const auto live = hn::FirstN(d, static_cast<std::size_t>(reflectance.count - i));
+    sum = hn::Add(sum, hn::IfThenElseZero(live, densityOf(d, reflectance, i, x, y)));
+  }
+  return hn::GetLane(hn::SumOfLanes(d, sum));
+}
+
+HWY_INLINE float reflectanceDensityAt(const LanesView& reflectance, float x, float y) {
+  if (reflectance.count == 0) return 0.0f;
+  if (reflectance.count <= kLaneStep) return reflectanceDensityBy(hn::CappedTag<float, kLaneStep>(), reflectance, x, y);
+  return reflectanceDensityBy(hn::CappedTag<float, kMostLanes>(), reflectance, x, y);
+}
+
+float LightDensity(const LanesView& light, float x, float y) {
+  return lightDensityAt(light, x, y);
+}
+
+Densities BothDensities(const LanesView& reflectance, const LanesView& light, float x, float y) {
+  return {reflectanceDensityAt(reflectance, x, y), lightDensityAt(light, x, y)};
+}
+
+// The largest t ≤ 1 with |mean + t · step| ≤ 1 for all means in the disc.
+template <class D>
+HWY_INLINE float largestStep(D d, const LanesView& mixture, const Placement& p) {
+  const float length2 = p.stepX * p.stepX + p.stepY * p.stepY;
+  const auto one = hn::Set(d, 1.0f);
+  if (!(length2 > 0)) return 1.0f;
+  const auto squared = hn::Set(d, length2), inverse = hn::Set(d, 1.0f / length2);
+  const auto stepX = hn::Set(d, p.mirrorX * p.stepX), stepY = hn::Set(d, p.mirrorY * p.stepY);
+  auto least = one;
+  for (int k = 0; k < mixture.count; k += static_cast<int>(hn::Lanes(d))) {
+    const auto x = hn::LoadU(d, mixture.field(LaneField::x) + k), y = hn::LoadU(d, mixture.field(LaneField::y) + k);
+    const auto room = hn::NegMulAdd(y, y, hn::NegMulAdd(x, x, one));
+    const auto along = hn::MulAdd(x, stepX, hn::Mul(y, stepY));
+    const auto root = hn::Sqrt(hn::Max(hn::MulAdd(squared, room, hn::Mul(along, along)), hn::Zero(d)));
+    const auto t = hn::Max(hn::Mul(hn::Sub(root, along), inverse), hn::Zero(d));
+    const auto bound = hn::And(hn::Gt(room, hn::Zero(d)), hn::FirstN(d, static_cast<std::size_t>(mixture.count - k)));
+    least = hn::Min(least, hn::IfThenElse(bound, t, one));
+  }
+  return hn::GetLane(hn::MinOfLanes(d, least));
+}
+
+template <class D>
+HWY_INLINE void placeBy(D d, const LanesView& mixture, const Placement& p, float* out, int stride, int first) {
+  const float t = largestStep(d, mixture, p);
+  const auto cosine = hn::Set(d, p.cosine), sine = hn::Set(d, p.sine);
+  const auto factor = hn::Set(d, p.factor), half = hn::Set(d, -kHalfLog2e);
+  for (int k = 0; k < mixture.count; k += static_cast<int>(hn::Lanes(d))) {
+    const auto from = [&](LaneField f) { return hn::LoadU(d, mixture.field(f) + k); };
+    const auto to = [&](LaneField f, hn::Vec<D> v) {
+      hn::StoreU(v, d, out + static_cast<int>(f) * stride + first + k);
+    };
+    const auto x = hn::MulAdd(hn::Set(d, p.mirrorX), from(LaneField::x), hn::Set(d, t * p.stepX));
+    const auto y = hn::MulAdd(hn::Set(d, p.mirrorY), from(LaneField::y), hn::Set(d, t * p.stepY));
+    to(LaneField::x, hn::NegMulAdd(sine, y, hn::Mul(cosine, x)));
+    to(LaneField::y, hn::MulAdd(cosine, y, hn::Mul(sine, x)));
+    // Σ = xx (1, slope)(1, slope)ᵀ + d (0, 1)(0, 1)ᵀ: both vectors are turned, and |Σ| stays.
+    const auto slope = hn::Mul(hn::Set(d, p.mirrorX * p.mirrorY), from(LaneField::slope));
+    const auto ux = hn::NegMulAdd(sine, slope, cosine), uy = hn::MulAdd(cosine, slope, sine);
+    const auto across = from(LaneField::across), along = from(LaneField::along), wide = from(LaneField::xx);
+    const auto narrow = hn::Div(half, across);
+    const auto xx = hn::MulAdd(hn::Mul(wide, ux), ux, hn::Mul(hn::Mul(narrow, sine), sine));
+    const auto xy = hn::NegMulAdd(hn::Mul(narrow, sine), cosine, hn::Mul(hn::Mul(wide, ux), uy));
+    const auto yy = hn::MulAdd(hn::Mul(wide, uy), uy, hn::Mul(hn::Mul(narrow, cosine), cosine));
+    const auto inverse = hn::Div(hn::Set(d, 1.0f), xx);
+    to(LaneField::xx, xx);
+    to(LaneField::xy, xy);
+    to(LaneField::yy, yy);
+    to(LaneField::slope, hn::Mul(xy, inverse));
+    to(LaneField::along, hn::Mul(half, inverse));
+    to(LaneField::across, hn::Mul(hn::Mul(xx, hn::Set(d, -1.0f / kHalfLog2e)), hn::Mul(along, across)));
+    to(LaneField::scale, hn::Mul(factor, from(LaneField::scale)));
+    to(LaneField::weight, hn::Mul(factor, from(LaneField::weight)));
+  }
+}
+
+void PlaceMixture(const LanesView& mixture, const Placement& placement, float* out, int stride, int first) {
+  if (mixture.count <= kLaneStep)
+    placeBy(hn::CappedTag<float, kLaneStep>(), mixture, placement, out, stride, first);
+  else
+    placeBy(hn::CappedTag<float, kMostLanes>(), mixture, placement, out, stride, first);
+}
+
+}  // namespace lobe::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace lobe {
+
+namespace {
+HWY_EXPORT(PairMasses);
+HWY_EXPORT(LightDensity);
+HWY_EXPORT(BothDensities);
+HWY_EXPORT(PlaceMixture);
+}  // namespace
+
+float pairMasses(const LanesView& reflectance, float constant, const LanesView& light, float* pairs, float* columns) {
+  return HWY_DYNAMIC_DISPATCH(PairMasses)(reflectance, constant, light, pairs, columns);
+}
+
+float lightDensity(const LanesView& light, float x, float y) {
+  return HWY_DYNAMIC_DISPATCH(LightDensity)(light, x, y);
+}
+
+Densities densities(const LanesView& reflectance, const LanesView& light, float x, float y) {
+  return HWY_DYNAMIC_DISPATCH(BothDensities)(reflectance, light, x, y);
+}
+
+void placeMixture(const LanesView& mixture, const Placement& placement, float* out, int stride, int first) {
+  HWY_DYNAMIC_DISPATCH(PlaceMixture)(mixture, placement, out, stride, first);
+}
+
+std::vector<std::int64_t> kernelTargets() {
+  return hwy::SupportedAndGeneratedTargets();
+}
+
+std::string kernelTargetName(std::int64_t target) {
+  return hwy::TargetName(target);
+}
+
+void useKernelTarget(std::int64_t target) {
+  hwy::SetSupportedTargetsForTest(target);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+}
+
+}  // namespace lobe
+#endif

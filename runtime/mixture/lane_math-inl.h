@@ -1,0 +1,37 @@
+// The exponential of the kernels. Included once for each instruction set: no #pragma once.
+#if defined(LOBE_LANE_MATH_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef LOBE_LANE_MATH_INL_H
+#undef LOBE_LANE_MATH_INL_H
+#else
+#define LOBE_LANE_MATH_INL_H
+#endif
+
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace lobe::HWY_NAMESPACE {
+
+/// 2^x for x ≤ 0 with a relative error below 2e-7 besides that of x itself; exactly 0 below −126, where floats stop
+/// being normal.
+template <class D>
+HWY_INLINE hwy::HWY_NAMESPACE::Vec<D> exp2Negative(D d, hwy::HWY_NAMESPACE::Vec<D> x) {
+  namespace hn = hwy::HWY_NAMESPACE;
+  const hn::RebindToSigned<D> di;
+  const auto lowest = hn::Set(d, -126.0f);
+  const auto whole = hn::NearestInt(hn::Max(x, lowest));
+  const auto r = hn::Sub(hn::Max(x, lowest), hn::ConvertTo(d, whole));
+  // Taylor to degree 6 on |r| ≤ ½.
+  auto p = hn::MulAdd(hn::Set(d, 1.5403530e-4f), r, hn::Set(d, 1.3333558e-3f));
+  p = hn::MulAdd(p, r, hn::Set(d, 9.6181291e-3f));
+  p = hn::MulAdd(p, r, hn::Set(d, 5.5504109e-2f));
+  p = hn::MulAdd(p, r, hn::Set(d, 2.4022651e-1f));
+  p = hn::MulAdd(p, r, hn::Set(d, 6.9314718e-1f));
+  p = hn::MulAdd(p, r, hn::Set(d, 1.0f));
+  const auto power = hn::BitCast(d, hn::ShiftLeft<23>(hn::Add(whole, hn::Set(di, 127))));
+  return hn::IfThenElseZero(hn::Gt(x, lowest), hn::Mul(p, power));
+}
+
+}  // namespace lobe::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
