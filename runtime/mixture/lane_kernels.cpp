@@ -126,30 +126,28 @@ Densities BothDensities(const LanesView& reflectance, const LanesView& light, fl
   return {reflectanceDensityAt(reflectance, x, y), lightDensityAt(light, x, y)};
 }
 
-// The largest t ≤ 1 with |mean + t · step| ≤ 1 for all means in the disc.
+/// A step's direction and length, for all lanes.
 template <class D>
-HWY_INLINE float largestStep(D d, const LanesView& mixture, const Placement& p) {
-  const float length2 = p.stepX * p.stepX + p.stepY * p.stepY;
-  const auto one = hn::Set(d, 1.0f);
-  if (!(length2 > 0)) return 1.0f;
-  const auto squared = hn::Set(d, length2), inverse = hn::Set(d, 1.0f / length2);
-  const auto stepX = hn::Set(d, p.mirrorX * p.stepX), stepY = hn::Set(d, p.mirrorY * p.stepY);
-  auto least = one;
-  for (int k = 0; k < mixture.count; k += static_cast<int>(hn::Lanes(d))) {
-    const auto x = hn::LoadU(d, mixture.field(LaneField::x) + k), y = hn::LoadU(d, mixture.field(LaneField::y) + k);
-    const auto room = hn::NegMulAdd(y, y, hn::NegMulAdd(x, x, one));
-    const auto along = hn::MulAdd(x, stepX, hn::Mul(y, stepY));
-    const auto root = hn::Sqrt(hn::Max(hn::MulAdd(squared, room, hn::Mul(along, along)), hn::Zero(d)));
-    const auto t = hn::Max(hn::Mul(hn::Sub(root, along), inverse), hn::Zero(d));
-    const auto bound = hn::And(hn::Gt(room, hn::Zero(d)), hn::FirstN(d, static_cast<std::size_t>(mixture.count - k)));
-    least = hn::Min(least, hn::IfThenElse(bound, t, one));
-  }
-  return hn::GetLane(hn::MinOfLanes(d, least));
+struct Step {
+  Step(D d, const Placement& p)
+      : x(hn::Set(d, p.stepX)), y(hn::Set(d, p.stepY)), squared(hn::Set(d, p.stepX * p.stepX + p.stepY * p.stepY)) {}
+  hn::Vec<D> x, y, squared;
+};
+
+// Of each mean in the disc the largest t ≤ 1 with |mean + t · step| ≤ 1; 1 for the others.
+template <class D>
+HWY_INLINE hn::Vec<D> largestStep(D d, hn::Vec<D> x, hn::Vec<D> y, const Step<D>& step) {
+  const auto zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+  const auto room = hn::NegMulAdd(y, y, hn::NegMulAdd(x, x, one));
+  const auto along = hn::MulAdd(x, step.x, hn::Mul(y, step.y));
+  const auto root = hn::Sqrt(hn::Max(hn::MulAdd(step.squared, room, hn::Mul(along, along)), zero));
+  const auto t = hn::Min(hn::Max(hn::Div(hn::Sub(root, along), step.squared), zero), one);
+  return hn::IfThenElse(hn::And(hn::Gt(room, zero), hn::Gt(step.squared, zero)), t, one);
 }
 
 template <class D>
 HWY_INLINE void placeBy(D d, const LanesView& mixture, const Placement& p, float* out, int stride, int first) {
-  const float t = largestStep(d, mixture, p);
+  const Step<D> step(d, p);
   const auto cosine = hn::Set(d, p.cosine), sine = hn::Set(d, p.sine);
   const auto factor = hn::Set(d, p.factor), half = hn::Set(d, -kHalfLog2e);
   for (int k = 0; k < mixture.count; k += static_cast<int>(hn::Lanes(d))) {
@@ -157,8 +155,10 @@ HWY_INLINE void placeBy(D d, const LanesView& mixture, const Placement& p, float
     const auto to = [&](LaneField f, hn::Vec<D> v) {
       hn::StoreU(v, d, out + static_cast<int>(f) * stride + first + k);
     };
-    const auto x = hn::MulAdd(hn::Set(d, p.mirrorX), from(LaneField::x), hn::Set(d, t * p.stepX));
-    const auto y = hn::MulAdd(hn::Set(d, p.mirrorY), from(LaneField::y), hn::Set(d, t * p.stepY));
+    const auto oldX = hn::Mul(hn::Set(d, p.mirrorX), from(LaneField::x)),
+               oldY = hn::Mul(hn::Set(d, p.mirrorY), from(LaneField::y));
+    const auto t = largestStep(d, oldX, oldY, step);
+    const auto x = hn::MulAdd(t, step.x, oldX), y = hn::MulAdd(t, step.y, oldY);
     to(LaneField::x, hn::NegMulAdd(sine, y, hn::Mul(cosine, x)));
     to(LaneField::y, hn::MulAdd(cosine, y, hn::Mul(sine, x)));
     // Σ = xx (1, slope)(1, slope)ᵀ + d (0, 1)(0, 1)ᵀ: both vectors are turned, and |Σ| stays.
