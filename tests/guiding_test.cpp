@@ -118,6 +118,7 @@ TEST_CASE("guiding: records come back as they were given, and few Gaussians take
   for (int count = 0; count <= kMaxLightComponents; ++count) {
     records.push_back(recordAt(randomPoint(rng), randomDirection(rng), 0.1f + rng.uniform()));
     records.back().count = count;
+    records.back().irradiance = rng.uniform();
     for (Gaussian& g : records.back().components)
       g = {rng.uniform(), rng.uniform(), rng.uniform(), {0.1f + rng.uniform(), 0.1f * rng.uniform(), 0.1f}};
   }
@@ -127,7 +128,8 @@ TEST_CASE("guiding: records come back as they were given, and few Gaussians take
   for (std::size_t i = 0; i < records.size(); ++i) {
     const IlluminationRecord &a = records[i], &b = back[i];
     CHECK((a.position == b.position && a.normal == b.normal && a.tangent == b.tangent && a.radius == b.radius));
-    CHECK((a.background == b.background && a.samples == b.samples && a.count == b.count));
+    CHECK(
+        (a.background == b.background && a.irradiance == b.irradiance && a.samples == b.samples && a.count == b.count));
     const auto bytes = static_cast<std::size_t>(a.count) * sizeof(Gaussian);
     CHECK(std::memcmp(a.components.data(), b.components.data(), bytes) == 0);
   }

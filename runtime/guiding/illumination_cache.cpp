@@ -72,14 +72,27 @@ void IlluminationCache::pack(const IlluminationRecord& record) {
   const auto index = static_cast<std::uint32_t>(places_.size());
   places_.push_back({record.position, record.normal, record.radius, static_cast<std::uint32_t>(first)});
   blocks_.resize(first + 1 + static_cast<std::size_t>(stride) * kLaneFields / std::size(Block{}.floats));
-  new (&blocks_[first]) PackedRecord{record.tangent, record.background, record.samples, record.count, stride, index};
+  new (&blocks_[first]) PackedRecord{.tangent = record.tangent,
+                                     .background = record.background,
+                                     .irradiance = record.irradiance,
+                                     .samples = record.samples,
+                                     .count = static_cast<std::uint16_t>(record.count),
+                                     .stride = static_cast<std::uint16_t>(stride),
+                                     .index = index};
   packLanes(record.gaussians(), blocks_[first + 1].floats.data(), stride);
 }
 
 IlluminationRecord IlluminationCache::unpacked(const PackedRecord& record) const {
   const Place& place = places_[record.index];
-  IlluminationRecord r{place.position,    place.normal,   record.tangent, place.radius,
-                       record.background, record.samples, record.count,   {}};
+  IlluminationRecord r{.position = place.position,
+                       .normal = place.normal,
+                       .tangent = record.tangent,
+                       .radius = place.radius,
+                       .background = record.background,
+                       .irradiance = record.irradiance,
+                       .samples = record.samples,
+                       .count = record.count,
+                       .components = {}};
   std::ranges::copy(unpackLanes(record.lanes()), r.components.begin());
   return r;
 }

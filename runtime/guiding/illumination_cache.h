@@ -34,10 +34,11 @@ struct IlluminationRecord {
 struct alignas(32) PackedRecord {
   Vec3 tangent;
   float background;
+  float irradiance;
   float samples;
-  std::int32_t count;   ///< Gaussians
-  std::int32_t stride;  ///< 4 or 8 lanes
-  std::uint32_t index;  ///< of the record, as it was given
+  std::uint16_t count;   ///< Gaussians
+  std::uint16_t stride;  ///< 4 or 8 lanes
+  std::uint32_t index;   ///< of the record, as it was given
 
   LanesView lanes() const { return {reinterpret_cast<const float*>(this + 1), stride, count}; }
 };
