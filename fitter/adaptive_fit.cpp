@@ -5,7 +5,6 @@
 #include <bit>
 #include <cmath>
 #include <optional>
-#include <ranges>
 
 #include <tbb/parallel_for.h>
 #include <Eigen/LU>
@@ -136,9 +135,9 @@ class DirectionFits {
 
   /// Fewer components, while they are good enough.
   FittedRecord less(FittedRecord best) const {
-    for (const std::uint32_t size : kSizes | std::views::reverse) {
-      if (size >= best.record.count) continue;
-      FittedRecord fitted = with(size);
+    for (auto size = kSizes.rbegin(); size != kSizes.rend(); ++size) {
+      if (*size >= best.record.count) continue;
+      FittedRecord fitted = with(*size);
       if (!goodEnough(fitted)) break;
       best = std::move(fitted);
     }

@@ -14,6 +14,8 @@
 #include <nlohmann/json.hpp>
 
 #include "fitter/compile.h"
+#include "materials/registry.h"
+#include "materials/roughness_levels.h"
 #include "scenes/reader.h"
 #include "scenes/tool.h"
 
@@ -27,6 +29,7 @@ constexpr double kLastElevation = 88;
 
 struct Options {
   std::string scene;
+  bool levels = false;
   std::vector<std::string> ways;
   ReadOptions read;
 };
@@ -49,16 +52,12 @@ Vec3 queryDirection(int i) {
           static_cast<float>(std::cos(theta))};
 }
 
-double worse(const Quality& q) {
-  return std::max(q.nev, q.coverage);
-}
-
 /// What a look-up for wo is worth; without components the lobe's own sampler is all there is, and it is not graded.
 std::optional<double> servedNev(const Lobe& lobe, const DirectionGrid& grid, const FittedGrid& fit, const Vec3& wo) {
   std::array<Gaussian, kMaxCacheComponents> room;
   const std::span<const Gaussian> mixture = fit.mixtureFor(grid, wo, room);
   if (mixture.empty()) return std::nullopt;
-  return worse(gradeMixture(lobe, wo, mixture, kGradeSamples));
+  return gradeMixture(lobe, wo, mixture, kGradeSamples).worse();
 }
 
 double quantile(std::vector<double> values, double share) {
@@ -73,9 +72,16 @@ std::vector<double> ownNevs(const Lobe& lobe, const CompileOptions& options) {
   std::vector<double> nevs;
   for (int i = 0; i < kDirections; ++i) {
     const Vec3 wo = queryDirection(i);
-    nevs.push_back(worse(gradeMixture(lobe, wo, fitLobe(lobe, wo, settings).mixture, kGradeSamples)));
+    nevs.push_back(gradeMixture(lobe, wo, fitLobe(lobe, wo, settings).mixture, kGradeSamples).worse());
   }
   return nevs;
+}
+
+void addQualities(const std::vector<double>& nevs, const std::vector<double>& ratios, nlohmann::ordered_json& row) {
+  row["nev_median"] = quantile(nevs, 0.5);
+  row["nev_worst"] = std::ranges::max(nevs);
+  row["ratio_median"] = quantile(ratios, 0.5);
+  row["ratio_p90"] = quantile(ratios, 0.9);
 }
 
 nlohmann::ordered_json measure(const LobeUse& use, const std::string& way, const std::vector<double>& own) {
@@ -95,11 +101,81 @@ nlohmann::ordered_json measure(const LobeUse& use, const std::string& way, const
   row["components"] = static_cast<double>(fit.components.size()) / static_cast<double>(fit.records.size());
   row["bytes"] = encodeLobeCache(job.info, fit.records, fit.components, fit.lookup).size();
   if (nevs.empty()) return row;
-  row["nev_median"] = quantile(nevs, 0.5);
-  row["nev_worst"] = std::ranges::max(nevs);
-  row["ratio_median"] = quantile(ratios, 0.5);
-  row["ratio_p90"] = quantile(ratios, 0.9);
+  addQualities(nevs, ratios, row);
   return row;
+}
+
+// ---- Textured roughness: what is looked up for an alpha in the middle between two levels is a mixture of theirs.
+
+struct FittedLevel {
+  double alpha;
+  DirectionGrid grid;
+  FittedGrid fit;
+};
+
+LobePtr conductorLobe(const char* distribution, double alpha) {
+  Parameters parameters;
+  parameters.set("distribution", distribution);
+  parameters.set("alpha", alpha);
+  return makeBsdf("roughconductor", parameters)->lobes().front();
+}
+
+/// Both levels have the same share of the reflectance, so each weighs by its integral.
+Mixture betweenLevels(const FittedLevel& a, const FittedLevel& b, const Vec3& wo) {
+  Mixture mixture;
+  double sum = 0;
+  for (const FittedLevel* level : {&a, &b}) {
+    std::array<Gaussian, kMaxCacheComponents> room;
+    const std::uint32_t found = level->fit.lookup[static_cast<std::size_t>(level->grid.nearest(wo))];
+    const CacheRecord& record = level->fit.records[found];
+    for (Gaussian g : level->fit.mixtureFor(level->grid, wo, room)) {
+      g.weight *= record.integral / std::max(1 - record.outside, 0.1f);
+      sum += g.weight;
+      mixture.push_back(g);
+    }
+  }
+  for (Gaussian& g : mixture) g.weight = static_cast<float>(g.weight / sum);
+  return mixture;
+}
+
+nlohmann::ordered_json measureBetween(const char* distribution, const std::string& way, const FittedLevel& a,
+                                      const FittedLevel& b) {
+  const double alpha = std::sqrt(a.alpha * b.alpha);
+  const LobePtr lobe = conductorLobe(distribution, alpha);
+  const std::vector<double> own = ownNevs(*lobe, optionsOf("ceres"));
+  std::vector<double> nevs, ratios;
+  for (int i = 0; i < kDirections; ++i) {
+    const Vec3 wo = queryDirection(i);
+    nevs.push_back(gradeMixture(*lobe, wo, betweenLevels(a, b, wo), kGradeSamples).worse());
+    ratios.push_back((1 + nevs.back()) / (1 + own[static_cast<std::size_t>(i)]));
+  }
+  nlohmann::ordered_json row{{"lobe", fmt::format("{} {:.3f}", distribution, alpha)}, {"way", way}};
+  addQualities(nevs, ratios, row);
+  return row;
+}
+
+/// Of the levels that are fitted: narrower ones are left to the BSDF.
+std::vector<FittedLevel> fitLevels(const char* distribution, const std::string& way) {
+  std::vector<FittedLevel> levels;
+  for (int i = 0; i < kRoughnessLevels; ++i) {
+    const double alpha = roughnessOfLevel(i);
+    const CompileJob job = planCompile({{conductorLobe(distribution, alpha), {}}}, optionsOf(way)).front();
+    FittedLevel level{alpha, job.grid, fitGrid(*job.use.lobe, job.grid, job.info.settings)};
+    if (!level.fit.components.empty()) levels.push_back(std::move(level));
+  }
+  return levels;
+}
+
+void runLevels(const Options& o) {
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  for (const char* distribution : {"ggx", "beckmann"}) {
+    for (const std::string& way : o.ways) {
+      const std::vector<FittedLevel> levels = fitLevels(distribution, way);
+      for (std::size_t i = 1; i < levels.size(); ++i)
+        rows.push_back(measureBetween(distribution, way, levels[i - 1], levels[i]));
+    }
+  }
+  fmt::print("{}\n", rows.dump(2));
 }
 
 void run(const Options& o) {
@@ -121,7 +197,9 @@ void run(const Options& o) {
 }
 
 void declare(CLI::App& app, Options& o) {
-  app.add_option("scene", o.scene, "Scene of which the lobes are fitted")->required();
+  auto* scene = app.add_option("scene", o.scene, "Scene of which the lobes are fitted");
+  auto* levels = app.add_flag("--levels", o.levels, "Instead: the levels of textured roughness, graded between them");
+  levels->excludes(scene);
   app.add_option("--way", o.ways, "wem, ceres, eq8 or auto:QUALITY; may be repeated")->required();
   addDefinitions(app, o.read.definitions);
 }
@@ -132,5 +210,10 @@ int main(int argc, char** argv) {
   Options options;
   return lobe::runTool(
       "lobebench-caches", "Fits the lobes of a scene in several ways, and grades what look-ups meet; prints JSON.",
-      argc, argv, [&](CLI::App& app) { declare(app, options); }, [&] { run(options); });
+      argc, argv, [&](CLI::App& app) { declare(app, options); },
+      [&] {
+        if (options.levels) return runLevels(options);
+        if (options.scene.empty()) throw UsageError("a scene or --levels is needed");
+        run(options);
+      });
 }

@@ -156,7 +156,7 @@ void fitChain(const Lobe& lobe, const DirectionGrid& grid, const std::vector<int
     const Vec3 wo = grid.direction(entry);
     FittedRecord& record = fitted[static_cast<std::size_t>(entry)];
     record = fitOfChain(lobe, wo, grid.kind, neighbour, settings);
-    neighbour.emplace(record, wo);
+    neighbour.emplace(Neighbour{record, wo});
     if (advance) advance();
   }
 }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "fitter/adaptive_fit.h"
 #include "fitter/compile.h"
 #include "fitter/disc_mass.h"
 #include "fitter/mass_slopes.h"
@@ -269,6 +270,29 @@ TEST_CASE("fitter: least squares are sound for few samples and components and fo
   CHECK(fitLobe(lobes[0], wo, settingsFor("ceres")).record.nev < 0.01f);
   CHECK(fitLobe(lobes[2], wo, settingsFor("ceres")).record.nevCoverage < 1 / 0.9f - 1);  // a tenth is lost
   CHECK(fitLobe(lobes[4], wo, settingsFor("ceres")).record.integral == 0);
+}
+
+TEST_CASE("fitter: the fit that chooses for itself is sound for few samples and odd lobes, and for extreme ones") {
+  const Vec3 wo = direction(60);
+  const Vec2 back = toDisc(wo);
+  const Mixture retro{{1, back.x(), back.y(), {0.002f, 0, 0.002f}}};
+  using Values = MixtureLobe::Values;
+  const MixtureLobe lobes[] = {MixtureLobe(retro), MixtureLobe(kTwoLobes), MixtureLobe(kTwoLobes, Values::noisy, true),
+                               MixtureLobe(kTwoLobes, Values::black)};
+  for (const std::uint32_t components : {1u, 8u}) {
+    for (const std::uint32_t samples : {16u, 1024u}) {
+      FitSettings settings = settingsFor("auto", components, samples);
+      settings.quality = 0.03f;
+      CAPTURE(components, samples);
+      for (const MixtureLobe& lobe : lobes) checkSound(fitWithFewest(lobe, wo, settings));
+      for (const double alpha : {0.001, 0.05, 1.0})
+        for (const double elevation : {0.0, 89.99})
+          checkSound(fitWithFewest(*conductorLobe(alpha, alpha), direction(elevation), settings));
+      checkSound(fitWithFewest(*conductorLobe(0.01, 1.0), direction(80, 45), settings));
+      for (const GridKind kind : {GridKind::elevation, GridKind::fibonacci})
+        CHECK(fitGrid(lobes[1], {kind, 1}, settings).records.size() == 1);
+    }
+  }
 }
 
 TEST_CASE("fitter: a fit from a neighbour keeps its components in correspondence") {
