@@ -24,9 +24,10 @@ struct Alignment {
 };
 
 /// Brings the mixture to wo (unit, z ≥ 0). What was fitted for an elevation is turned to wo's azimuth first. Then all
-/// means move by −(y(wo) − y(reference)), because the centre of a reflection lobe is near −y(wo); the step of a mean that
-/// lies in the disc and would leave it ends at the edge. Writes to the front of out, which has room for all components, and
-/// returns what was written. No allocation. (Herholz et al. 2016, Section 4; the sign is tested by NEV.)
+/// means move by −(y(wo) − y(reference)), because the centre of a reflection lobe is near −y(wo); the step of a mean
+/// that lies in the disc and would leave it ends at the edge. Writes to the front of out, which has room for all
+/// components, and returns what was written. No allocation. (Herholz et al. 2016, Section 4; the sign is tested by
+/// NEV.)
 std::span<Gaussian> alignMixture(const Alignment& alignment, std::span<const Gaussian> components, const Vec3& wo,
                                  std::span<Gaussian> out);
 
