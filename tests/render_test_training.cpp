@@ -158,8 +158,9 @@ TEST_CASE("training: guided photons bring the same light as others, with less no
   const auto guided = photonFlux(ready, guides.importanceSampler, 70000, 2, bins, bin);
   CHECK(agree(plain, guided));
   const auto all = [&](const Particle& p) { return patch.contains(p) ? 0 : -1; };
-  const Moments one = photonFlux(ready, unguided.sampler, 20000, 3, 1, all)[0];
-  CHECK(photonFlux(ready, guides.importanceSampler, 20000, 4, 1, all)[0].error() < 0.8 * one.error());
+  const Moments one = photonFlux(ready, unguided.sampler, 60000, 3, 1, all)[0];
+  const Moments other = photonFlux(ready, guides.importanceSampler, 60000, 4, 1, all)[0];
+  CHECK(other.error() < 0.9 * one.error());  // 0.77 as measured
 }
 
 TEST_CASE("training: camera paths and photons see the same light from the same directions") {
