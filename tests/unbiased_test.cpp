@@ -64,14 +64,11 @@ class Studio {
   PathIntegrator path() const { return {*renderScene_, {}}; }
   GuidedIntegrator guided() const { return {*renderScene_, {}, *guided_}; }
   GuidedIntegrator product() const { return {*renderScene_, {}, *product_}; }
-  /// Paths are ended and split by what is expected of them.
-  GuidedIntegrator window(const GuidedSampler& sampler) const {
+  GuidedIntegrator plainProduct() const {
     PathOptions options;
-    options.termination = Termination::window;
-    return {*renderScene_, options, sampler};
+    options.termination = Termination::plain;
+    return {*renderScene_, options, *product_};
   }
-  GuidedIntegrator guidedWindow() const { return window(*guided_); }
-  GuidedIntegrator productWindow() const { return window(*product_); }
   const RenderScene& renderScene() const { return *renderScene_; }
   const Scene& scene() const { return scene_; }
   const GuidedSampler& productSampler() const { return *product_; }
@@ -132,8 +129,7 @@ TEST_CASE("unbiased: path, guided and product agree on the demo scene", "[slow]"
   const auto path = blocks(studio.render(studio.path(), 2 * samples, 1), size);
   CHECK(agree(path, blocks(studio.render(studio.guided(), samples, 2), size)));
   CHECK(agree(path, blocks(studio.render(studio.product(), samples, 3), size)));
-  CHECK(agree(path, blocks(studio.render(studio.guidedWindow(), samples, 5), size)));
-  CHECK(agree(path, blocks(studio.render(studio.productWindow(), samples, 6), size)));
+  CHECK(agree(path, blocks(studio.render(studio.plainProduct(), samples, 5), size)));
   CHECK_FALSE(agree(path, blocks(studio.render(WrongIntegrator(studio), samples, 4), size)));
 }
 
@@ -146,8 +142,7 @@ TEST_CASE("unbiased: inside a glowing box radiance is emission over absorption",
       <emitter type="area"><rgb name="radiance" value="0.8, 0.8, 0.8"/></emitter></shape></scene>)";
   const Studio studio(readScene(folder / "furnace.xml"), 30, 20);
   for (const auto& film : {studio.render(studio.path(), 256, 6), studio.render(studio.guided(), 256, 7),
-                           studio.render(studio.guidedWindow(), 256, 9), studio.render(studio.productWindow(), 256, 10),
-                           studio.render(studio.product(), 256, 8)}) {
+                           studio.render(studio.plainProduct(), 256, 9), studio.render(studio.product(), 256, 8)}) {
     const auto found = blocks(film, 5);
     CHECK(agree(found, exactly(2.0, found.size())));
   }

@@ -37,6 +37,16 @@ float coveredShare(const Reflectance& reflectance) {
   return all > 0 ? reflectance.albedo / all : 1.0f;
 }
 
+// Records that have seen less than five particles a component know little, and light of which less than this share has
+// a shape is sampled by the BSDF as well as by a product.
+constexpr float kUndersampled = 40;
+constexpr float kEvenBackground = 0.98f;
+
+StrategyShares sharesFor(GuidingDecision decision, const PackedRecord& record) {
+  if (decision == GuidingDecision::undersampled) return kGuidedShares;
+  return record.samples < kUncertainSamples ? kUncertainProductShares : kProductShares;
+}
+
 }  // namespace
 
 std::vector<LobeRequest> lobeRequests(const Scene& scene) {
@@ -64,13 +74,20 @@ GuidedSampler::Vertex::Vertex(const GuidedSampler& sampler, const SurfaceHit& hi
   const LobeMixture mixture = hit.bsdf->mixture(hit.wo, hit.uv);
   irradiance_ = record->irradiance;
   product_ = sampler.caches_ != nullptr;
-  StrategyShares shares = kGuidedShares;
-  if (sampler.caches_) {
-    collectReflectance(sampler, hit, mixture, side);
-    shares = record->samples < kUncertainSamples ? kUncertainProductShares : kProductShares;
-  }
-  density_.emplace(reflectance_, *record,
-                   onCovered(shares, (1 - mixture.transmittedShare) * coveredShare(reflectance_)));
+  if (product_) collectReflectance(sampler, hit, mixture, side);
+  const float covered = (1 - mixture.transmittedShare) * coveredShare(reflectance_);
+  decision_ = decide(*record, covered);
+  if (decision_ != GuidingDecision::narrow && decision_ != GuidingDecision::even)
+    density_.emplace(reflectance_, *record,
+                     onCovered(product_ ? sharesFor(decision_, *record) : kGuidedShares, covered));
+}
+
+GuidingDecision GuidedSampler::Vertex::decide(const PackedRecord& record, float covered) const {
+  if (covered <= 0) return GuidingDecision::narrow;
+  if (!product_) return GuidingDecision::illumination;
+  if (record.samples < kUndersampled) return GuidingDecision::undersampled;
+  if (record.background > kEvenBackground) return GuidingDecision::even;
+  return reflectance_.count > 0 ? GuidingDecision::product : GuidingDecision::illumination;
 }
 
 void GuidedSampler::Vertex::collectReflectance(const GuidedSampler& sampler, const SurfaceHit& hit,
@@ -93,6 +110,7 @@ std::optional<BsdfSample> GuidedSampler::Vertex::sample(Rng& rng, PathStatistics
   const Vec2 u = rng.uniform2();
   const Strategy strategy = density_ ? density_->choose(choice) : Strategy::bsdf;
   statistics.count(asCounted(strategy));
+  statistics.count(decision_);
   if (strategy == Strategy::bsdf) {
     std::optional<BsdfSample> sample = hit_.bsdf->sample(hit_.wo, hit_.uv, choice, u);
     if (sample && density_)
@@ -116,7 +134,9 @@ std::optional<float> GuidedSampler::Vertex::reflectedRadiance() const {
   // Nothing is known of light that comes through the surface.
   if (!(irradiance_ > 0) || hit_.bsdf->transmits()) return std::nullopt;
   const float diffuse = product_ ? reflectance_.uncoveredAlbedo : luminance(hit_.bsdf->albedo(hit_.wo, hit_.uv));
-  return irradiance_ * (diffuse * kInvPi + (product_ ? density_->reflected() : 0.0f));
+  if (!product_) return irradiance_ * diffuse * kInvPi;
+  const bool shaped = decision_ == GuidingDecision::product || decision_ == GuidingDecision::illumination;
+  return irradiance_ * (diffuse * kInvPi + (shaped ? density_->reflected() : reflectance_.backgroundMass));
 }
 
 Rgb GuidedIntegrator::radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const {

@@ -33,6 +33,7 @@ class GuidedSampler {
    private:
     void collectReflectance(const GuidedSampler& sampler, const SurfaceHit& hit, const LobeMixture& mixture,
                             float side);
+    GuidingDecision decide(const PackedRecord& record, float covered) const;
     Vec3 toGuide(const Vec3& wi) const { return axes_ * wi; }
 
     const SurfaceHit& hit_;
@@ -41,6 +42,7 @@ class GuidedSampler {
     std::optional<GuidedDensity> density_;
     float irradiance_ = 0;  // of the record
     bool product_ = false;
+    GuidingDecision decision_ = GuidingDecision::noRecord;
   };
 
  private:

@@ -13,14 +13,23 @@ namespace lobe {
 enum class SamplingStrategy { bsdf, product, illumination, delta };
 inline constexpr std::array<const char*, 4> kSamplingStrategyNames{"bsdf", "product", "illumination", "delta"};
 
+/// What a guided sampler made of a vertex: the product; the illumination mixture as it is, where reflection is constant
+/// or no product was asked for; the two halves of a record that has seen too little; or the BSDF alone, where what it
+/// reflects has no mixture (lobes next to a mirror), light is even, or there is no record.
+enum class GuidingDecision { product, illumination, undersampled, narrow, even, noRecord };
+inline constexpr std::array<const char*, 6> kGuidingDecisionNames{"product", "illumination", "undersampled",
+                                                                  "narrow",  "even",         "no_record"};
+
 /// Counted by each thread for itself and summed; sums of integers do not depend on the order.
 struct PathStatistics {
   std::uint64_t paths = 0;
   std::uint64_t segments = 0;    ///< rays traced to extend paths
   std::uint64_t shadowRays = 0;  ///< rays traced towards lights
   std::array<std::uint64_t, kSamplingStrategyNames.size()> strategies{};
+  std::array<std::uint64_t, kGuidingDecisionNames.size()> decisions{};
 
   void count(SamplingStrategy strategy) { ++strategies[static_cast<std::size_t>(strategy)]; }
+  void count(GuidingDecision decision) { ++decisions[static_cast<std::size_t>(decision)]; }
   std::uint64_t rays() const { return segments + shadowRays; }
 
   PathStatistics& operator+=(const PathStatistics& other) {
@@ -28,6 +37,7 @@ struct PathStatistics {
     segments += other.segments;
     shadowRays += other.shadowRays;
     for (std::size_t i = 0; i < strategies.size(); ++i) strategies[i] += other.strategies[i];
+    for (std::size_t i = 0; i < decisions.size(); ++i) decisions[i] += other.decisions[i];
     return *this;
   }
 };

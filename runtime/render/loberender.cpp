@@ -64,7 +64,7 @@ void declare(CLI::App& app, Options& options) {
                  "How paths end: plain, by what they carry, or window, by what is expected of them (guided, product)")
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, Termination>{{"plain", Termination::plain}, {"window", Termination::window}}))
-      ->default_str("plain");
+      ->default_str("window");
   app.add_option("--seed", job.seed, "Random seed")
       ->check(CLI::Range(std::uint64_t{0}, kMaxSeed))
       ->capture_default_str();

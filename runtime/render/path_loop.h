@@ -40,7 +40,7 @@ enum class Termination { plain, window };
 struct PathOptions {
   int maxDepth = std::numeric_limits<int>::max();  ///< segments: 1 shows emitters only, 2 adds direct light
   int rouletteDepth = 5;                           ///< segments before paths may end by chance
-  Termination termination = Termination::plain;
+  Termination termination = Termination::window;
 };
 
 /// At most this often does a path go on once Russian roulette may end it, so that every path ends.

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <fstream>
 #include <memory>
+#include <numeric>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -161,15 +162,19 @@ nlohmann::ordered_json asJson(const PassReport& pass) {
           {"log_likelihood", pass.logLikelihood ? nlohmann::ordered_json(*pass.logLikelihood) : nullptr}};
 }
 
+/// Counts over their sum, by name.
+template <std::size_t size>
+nlohmann::ordered_json sharesOf(const std::array<std::uint64_t, size>& counts,
+                                const std::array<const char*, size>& names) {
+  const double sum = std::accumulate(counts.begin(), counts.end(), 0.0);
+  nlohmann::ordered_json shares;
+  for (std::size_t i = 0; i < size; ++i) shares[names[i]] = sum > 0 ? static_cast<double>(counts[i]) / sum : 0.0;
+  return shares;
+}
+
 nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, const RunResult& run) {
   const PathStatistics& paths = run.render.statistics;
   const RenderProgress& total = run.render.total;
-  nlohmann::ordered_json shares;
-  std::uint64_t decisions = 0;
-  for (const std::uint64_t n : paths.strategies) decisions += n;
-  for (std::size_t i = 0; i < kSamplingStrategyNames.size(); ++i)
-    shares[kSamplingStrategyNames[i]] =
-        decisions > 0 ? static_cast<double>(paths.strategies[i]) / static_cast<double>(decisions) : 0.0;
   nlohmann::ordered_json passes = nlohmann::ordered_json::array();
   for (const PassReport& pass : run.training().passes) passes.push_back(asJson(pass));
   return {{"integrator", nameOf(job.integrator)},
@@ -192,7 +197,8 @@ nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, c
           {"records_undersampled_share", run.training().undersampledShare},
           {"record_bytes", run.guiding.training.cache.bytes()},
           {"lobe_bytes", run.guiding.caches ? run.guiding.caches->bytes() : 0},
-          {"strategy_shares", shares},
+          {"strategy_shares", sharesOf(paths.strategies, kSamplingStrategyNames)},
+          {"guiding_decisions", sharesOf(paths.decisions, kGuidingDecisionNames)},
           {"nonfinite_samples", run.dropped}};
 }
 

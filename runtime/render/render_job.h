@@ -28,7 +28,7 @@ struct RenderJob {
   std::optional<double> seconds;  ///< of training and rendering together
   std::optional<std::pair<int, int>> size;
   std::optional<int> maxDepth;  ///< segments
-  Termination termination = Termination::plain;
+  Termination termination = Termination::window;
   std::uint64_t seed = 1;
   TrainingPlan training;
   std::optional<int> passes;           ///< of training; by default the plan's, or without limit where time is one
