@@ -87,7 +87,7 @@ GuidingDecision GuidedSampler::Vertex::decide(const PackedRecord& record, float 
   if (!product_) return GuidingDecision::illumination;
   if (record.samples < kUndersampled) return GuidingDecision::undersampled;
   if (record.background > kEvenBackground) return GuidingDecision::even;
-  return reflectance_.gaussians.count > 0 ? GuidingDecision::product : GuidingDecision::illumination;
+  return reflectance_.gaussians.count() > 0 ? GuidingDecision::product : GuidingDecision::illumination;
 }
 
 void GuidedSampler::Vertex::collectReflectance(const GuidedSampler& sampler, const SurfaceHit& hit,
