@@ -1,4 +1,5 @@
-// lobedump FILE.lobe...: shows what caches hold and how good they are, as tables, JSON, pictures or differences.
+// lobedump FILE...: shows what caches of BRDFs (.lobe) and of illumination (.illum) hold and how good they are, as
+// tables, JSON, pictures, points or differences.
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -6,6 +7,7 @@
 #include "fitter/cache_diff.h"
 #include "fitter/cache_grid.h"
 #include "fitter/compile.h"
+#include "fitter/illumination_report.h"
 #include "fitter/plot.h"
 #include "fitter/report.h"
 #include "scenes/reader.h"
@@ -35,15 +37,19 @@ struct Options {
   bool records = false;
   bool json = false;
   bool diff = false;
-  std::string plot, scene;
+  std::string plot, scene, points;
   int record = -1;
   ReadOptions read;
 };
 
 void declare(CLI::App& app, Options& o) {
-  app.add_option("files", o.files, "Cache files")->required()->type_name("FILE.lobe")->default_str("");
+  app.add_option("files", o.files, "Cache files: of lobes (.lobe), or of illumination (.illum)")
+      ->required()
+      ->type_name("FILE")
+      ->default_str("");
   auto* records = app.add_flag("--records", o.records, "Also print a row for every record");
-  auto* json = app.add_flag("--json", o.json, "Print everything, with all components, as JSON");
+  auto* json =
+      app.add_flag("--json", o.json, "Print everything as JSON; the records of illumination only with --records");
   app.add_flag("--diff", o.diff, "Say what differs between two caches")->excludes(records);
   auto* plot = app.add_option("--plot", o.plot, "Draw records of one cache: target, fit and ratio")
                    ->type_name("OUT.png")
@@ -59,12 +65,24 @@ void declare(CLI::App& app, Options& o) {
       ->type_name("SCENE.xml")
       ->default_str("")
       ->needs(plot);
+  app.add_option("--points", o.points, "Write the records of one file of illumination as a cloud of points")
+      ->type_name("OUT.ply")
+      ->default_str("")
+      ->excludes(records)
+      ->excludes(json)
+      ->excludes(plot)
+      ->excludes("--diff");
   addDefinitions(app, o.read.definitions);
   app.footer(kFooter);
 }
 
 void validate(const Options& o) {
   if (o.diff && o.files.size() != 2) throw UsageError("--diff takes two cache files");
+  if (!o.points.empty()) {
+    if (o.files.size() != 1) throw UsageError("--points takes one file of illumination");
+    if (std::filesystem::path(o.points).extension() != ".ply")
+      throw UsageError(fmt::format("--points {}: points are written as .ply", o.points));
+  }
   if (o.plot.empty()) return;
   if (o.files.size() != 1) throw UsageError("--plot takes one cache file");
   if (std::filesystem::path(o.plot).extension() != ".png")
@@ -162,9 +180,44 @@ void runPlot(const LobeCache& cache, Options& o) {
   printLegend(cache, plot, o);
 }
 
+// ---- Illumination
+
+bool isIllumination(const std::string& file) {
+  return isOfKind(kIlluminationFormat, MappedFile(file).bytes());
+}
+
+void validateForIllumination(const Options& o) {
+  if (o.diff || !o.plot.empty()) throw UsageError("--diff and --plot are for caches of lobes");
+  if (!std::ranges::all_of(o.files, isIllumination))
+    throw UsageError("caches of lobes and of illumination are shown by a run each");
+}
+
+void runIllumination(const Options& o) {
+  validateForIllumination(o);
+  std::vector<IlluminationFile> files;
+  for (const std::string& file : o.files) files.push_back(IlluminationFile::open(file));
+  if (!o.points.empty()) return writePoints(files[0], o.points);
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (o.json) {
+      json.push_back(toJson(files[i], o.files[i], o.records));
+      continue;
+    }
+    if (i > 0) fmt::print("\n");
+    printIllumination(files[i], o.files[i], stdout);
+    if (o.records) printRecords(files[i], stdout);
+  }
+  if (o.json) fmt::print("{}\n", json.dump(2));
+}
+
 /// false: --diff found a difference.
 bool run(Options& o) {
   validate(o);
+  if (std::ranges::any_of(o.files, isIllumination)) {
+    runIllumination(o);
+    return true;
+  }
+  if (!o.points.empty()) throw UsageError("--points is for files of illumination");
   std::vector<LobeCache> caches;
   for (const std::string& file : o.files) caches.push_back(LobeCache::open(file));
   if (o.diff) return runDiff(caches[0], caches[1], o);

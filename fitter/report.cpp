@@ -37,10 +37,7 @@ Json recordJson(const LobeCache& cache, std::size_t index) {
             {"nev_coverage", gradeJson(r, r.nevCoverage)},
             {"worst_ratio", gradeJson(r, r.worstRatio)},
             {"components", Json::array()}};
-  for (const CacheComponent& c : cache.components(r))
-    json["components"].push_back({{"weight", shortNumber(c.weight)},
-                                  {"mean", {shortNumber(c.meanX), shortNumber(c.meanY)}},
-                                  {"covariance", {shortNumber(c.covXX), shortNumber(c.covXY), shortNumber(c.covYY)}}});
+  for (const CacheComponent& c : cache.components(r)) json["components"].push_back(componentJson(c));
   return json;
 }
 
@@ -80,6 +77,12 @@ std::string gradeText(const CacheRecord& record, const std::string& text) {
 
 std::string componentsText(const CacheRecord& record) {
   return graded(record) ? std::to_string(record.count) : "BSDF";
+}
+
+Json componentJson(const CacheComponent& c) {
+  return {{"weight", shortNumber(c.weight)},
+          {"mean", {shortNumber(c.meanX), shortNumber(c.meanY)}},
+          {"covariance", {shortNumber(c.covXX), shortNumber(c.covXY), shortNumber(c.covYY)}}};
 }
 
 Json shortNumber(float value) {

@@ -62,6 +62,8 @@ std::string gradeText(const CacheRecord& record, const std::string& text);
 /// The number of components, or "BSDF".
 std::string componentsText(const CacheRecord& record);
 
+nlohmann::ordered_json componentJson(const CacheComponent& component);
+
 /// A float as the shortest decimal that reads back the same, not as the double it converts to.
 nlohmann::ordered_json shortNumber(float value);
 

@@ -5,6 +5,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "materials/fingerprint.h"
+
 namespace lobe {
 namespace {
 
@@ -62,6 +64,16 @@ class BitmapTexture final : public Texture {
     if (uses(Wrap::zero)) range = {std::min(range.smallest, 0.0f), std::max(range.largest, 0.0f)};
     if (uses(Wrap::one)) range = {std::min(range.smallest, 1.0f), std::max(range.largest, 1.0f)};
     return range;
+  }
+  std::uint64_t fingerprint() const override {
+    Fingerprint hash;
+    hash.text("bitmap");
+    addTo(hash, *image_);
+    hash.number(options_.wrapU);
+    hash.number(options_.wrapV);
+    hash.number(options_.nearest);
+    options_.uvMap.addTo(hash);
+    return hash.value();
   }
 
  private:

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "materials/fingerprint.h"
+
 namespace lobe {
 namespace {
 
@@ -20,6 +22,14 @@ class CheckerboardTexture final : public Texture {
   TextureRange range() const override {
     const TextureRange a = a_->range(), b = b_->range();
     return {std::min(a.smallest, b.smallest), std::max(a.largest, b.largest)};
+  }
+  std::uint64_t fingerprint() const override {
+    Fingerprint hash;
+    hash.text("checkerboard");
+    hash.number(a_->fingerprint());
+    hash.number(b_->fingerprint());
+    uvMap_.addTo(hash);
+    return hash.value();
   }
 
  private:

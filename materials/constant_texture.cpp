@@ -1,3 +1,4 @@
+#include "materials/fingerprint.h"
 #include "materials/texture.h"
 
 namespace lobe {
@@ -9,6 +10,12 @@ class ConstantTexture final : public Texture {
   Rgb eval(const Vec2&) const override { return colour_; }
   Rgb mean() const override { return colour_; }
   TextureRange range() const override { return {luminance(colour_), luminance(colour_)}; }
+  std::uint64_t fingerprint() const override {
+    Fingerprint hash;
+    hash.text("constant");
+    hash.coefficients(colour_);
+    return hash.value();
+  }
 
  private:
   Rgb colour_;

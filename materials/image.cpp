@@ -18,6 +18,8 @@
 
 #include <fmt/format.h>
 
+#include "materials/fingerprint.h"
+
 // Private to this file, so that another copy elsewhere does not clash.
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
@@ -244,6 +246,11 @@ bool startsLikeExr(const std::filesystem::path& path) {
 }
 
 }  // namespace
+
+void addTo(Fingerprint& hash, const Image& image) {
+  hash.number(image.width);
+  hash.array(std::span<const Rgb>(image.pixels));
+}
 
 Image readImage(const std::filesystem::path& path, Encoding encoding) {
   if (!std::filesystem::exists(path)) fail(path, "no such file");

@@ -21,6 +21,11 @@ struct Image {
   const Rgb& at(int x, int y) const { return pixels[static_cast<std::size_t>(y) * width + x]; }
 };
 
+class Fingerprint;
+
+/// Adds size and pixels.
+void addTo(Fingerprint& hash, const Image& image);
+
 /// How the numbers of an 8- or 16-bit file become linear: by the sRGB curve, as they are, or by a power (gamma).
 struct Encoding {
   enum class Kind { srgb, linear, gamma } kind = Kind::srgb;

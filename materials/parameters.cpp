@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "materials/fingerprint.h"
+
 namespace lobe {
 namespace {
 
@@ -13,7 +15,29 @@ constexpr const char* kKindNames[] = {"boolean", "number", "text", "colour", "tr
                                                       kKindNames[value.index()], wanted));
 }
 
+/// Adds a value of any kind.
+struct FingerprintOfValue {
+  Fingerprint& hash;
+  void operator()(bool value) const { hash.number(value); }
+  void operator()(double value) const { hash.number(value); }
+  void operator()(const std::string& value) const { hash.text(value); }
+  void operator()(const Rgb& value) const { hash.coefficients(value); }
+  void operator()(const Eigen::Matrix4d& value) const { hash.coefficients(value); }
+  void operator()(const TexturePtr& value) const { hash.number(value->fingerprint()); }
+};
+
 }  // namespace
+
+std::uint64_t Parameters::fingerprint() const {
+  Fingerprint hash;
+  for (const auto& [name, entry] : entries_) {
+    if (name == "filename") continue;
+    hash.text(name);
+    hash.number(entry.value.index());
+    std::visit(FingerprintOfValue{hash}, entry.value);
+  }
+  return hash.value();
+}
 
 void Parameters::set(const std::string& name, ParameterValue value, std::ptrdiff_t location) {
   entries_.insert_or_assign(name, Entry{std::move(value), location, false});

@@ -5,6 +5,7 @@
 // Every query marks its parameter as used, so that what nobody asked for can be reported instead of ignored.
 
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <set>
 #include <stdexcept>
@@ -34,6 +35,10 @@ class Parameters {
   /// location: where the parameter stands in its file (an offset), handed back by unused() and location().
   void set(const std::string& name, ParameterValue value, std::ptrdiff_t location = 0);
   void addChild(BsdfPtr bsdf) { children_.push_back(std::move(bsdf)); }
+
+  /// Of all names and values, textures by what they show. Not of the children, nor of file names, which say where
+  /// something is, not what.
+  std::uint64_t fingerprint() const;
 
   /// For those who know what to do with it: the name counts as asked for. contains is for those who only pass it on.
   bool has(std::string_view name) const;

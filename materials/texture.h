@@ -1,6 +1,7 @@
 #pragma once
 // A colour that may vary over a surface.
 
+#include <cstdint>
 #include <memory>
 
 #include "materials/vec.h"
@@ -22,6 +23,8 @@ class Texture {
   virtual Rgb mean() const = 0;
   /// Bounds of the colour's luminance over all uv, tight but for coloured scales of colours; equal for a constant.
   virtual TextureRange range() const = 0;
+  /// Of all that eval depends on: textures that look the same because they are made alike have the same on every run.
+  virtual std::uint64_t fingerprint() const = 0;
 };
 
 using TexturePtr = std::shared_ptr<const Texture>;

@@ -1,6 +1,7 @@
 #pragma once
 // Texture coordinates, moved about.
 
+#include "materials/fingerprint.h"
 #include "materials/vec.h"
 
 namespace lobe {
@@ -10,6 +11,11 @@ struct UvMap {
   Vec2 offset = Vec2::Zero();  ///< added after
 
   Vec2 operator()(const Vec2& uv) const { return linear * uv + offset; }
+  /// Adds both.
+  void addTo(Fingerprint& hash) const {
+    hash.coefficients(linear);
+    hash.coefficients(offset);
+  }
 };
 
 }  // namespace lobe

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "materials/fingerprint.h"
 #include "materials/registry.h"
 #include "scenes/reader_parameters.h"
 #include "scenes/values.h"
@@ -11,10 +12,15 @@
 namespace lobe {
 namespace {
 
-BsdfPtr makeDiffuseOf(float reflectance) {
-  Parameters parameters;
-  parameters.set("reflectance", static_cast<double>(reflectance));
-  return makeBsdf("diffuse", parameters);
+/// children: of the nested BSDFs. What a measured BSDF has from its file is in its lobes' keys.
+std::uint64_t fingerprintOf(const std::string& type, const Parameters& parameters,
+                            std::span<const std::uint64_t> children, const Bsdf& bsdf) {
+  Fingerprint hash;
+  hash.text(type);
+  hash.number(parameters.fingerprint());
+  hash.array(children);
+  for (const LobePtr& lobe : bsdf.lobes()) hash.text(lobe->key());
+  return hash.value();
 }
 
 /// What Mitsuba 3 changed: a metal that is not named is a perfect mirror (η 0, k 1) rather than copper.
@@ -34,16 +40,23 @@ void MaterialReader::check(pugi::xml_node node) {
   if (!namesMeasurement(node) && !node.find_node(namesMeasurement)) read(node);
 }
 
-BsdfPtr MaterialReader::read(pugi::xml_node node) {
+MaterialReader::Made MaterialReader::makeDiffuseOf(float reflectance) {
+  Parameters parameters;
+  parameters.set("reflectance", static_cast<double>(reflectance));
+  const BsdfPtr bsdf = makeBsdf("diffuse", parameters);
+  return {bsdf, fingerprintOf("diffuse", parameters, {}, *bsdf)};
+}
+
+const MaterialReader::Made& MaterialReader::done(pugi::xml_node node) {
   const auto [entry, isNew] = done_.try_emplace(SceneFile::location(node));
   if (isNew)
     entry->second = make(node);
-  else if (!entry->second)
+  else if (!entry->second.bsdf)
     context_.file.fail(node, "a bsdf that refers to itself");
   return entry->second;
 }
 
-BsdfPtr MaterialReader::make(pugi::xml_node node) {
+MaterialReader::Made MaterialReader::make(pugi::xml_node node) {
   const std::string type = typeOf(context_, node);
   const std::vector<std::string> known = knownBsdfs();
   if (std::ranges::find(known, type) == known.end()) {
@@ -57,15 +70,19 @@ BsdfPtr MaterialReader::make(pugi::xml_node node) {
   const Encoded encoded = type == "normalmap" ? Encoded::linear
                           : type == "bumpmap" ? Encoded::asGivenSigned
                                               : Encoded::asGiven;
+  std::vector<std::uint64_t> children;
   const auto onChild = [&](pugi::xml_node child, const std::string& name, Parameters& parameters) {
     if (elementName(child) != "bsdf") return textures_.take(child, name, parameters, encoded);
-    parameters.addChild(read(child));
+    const Made& nested = done(child);
+    parameters.addChild(nested.bsdf);
+    children.push_back(nested.fingerprint);
     return true;
   };
   Parameters parameters = readParameters(context_, node, "texture, bsdf, ref", onChild);
   if (context_.file.isOfToday()) setDefaultsOfToday(type, parameters);
   if (namesMeasurement(node) && !resolveFile(node, parameters)) return makeDiffuseOf(0.5f);
-  return makeFrom(context_, node, parameters, [&](const Parameters& p) { return makeBsdf(type, p); });
+  const BsdfPtr bsdf = makeFrom(context_, node, parameters, [&](const Parameters& p) { return makeBsdf(type, p); });
+  return {bsdf, fingerprintOf(type, parameters, children, *bsdf)};
 }
 
 bool MaterialReader::resolveFile(pugi::xml_node node, Parameters& parameters) {
@@ -83,7 +100,7 @@ bool MaterialReader::resolveFile(pugi::xml_node node, Parameters& parameters) {
 
 int MaterialReader::use(pugi::xml_node node) {
   const auto [entry, isNew] = materials_.try_emplace(SceneFile::location(node));
-  if (isNew) entry->second = add(node.attribute("id").value(), read(node));
+  if (isNew) entry->second = add(node.attribute("id").value(), done(node));
   return entry->second;
 }
 
@@ -93,9 +110,9 @@ int MaterialReader::useDefault(bool emits) {
   return entry->second;
 }
 
-int MaterialReader::add(std::string name, BsdfPtr bsdf) {
+int MaterialReader::add(std::string name, const Made& made) {
   if (name.empty()) name = fmt::format("unnamed-{}", ++unnamed_);
-  context_.scene.materials.push_back({std::move(name), std::move(bsdf)});
+  context_.scene.materials.push_back({std::move(name), made.bsdf, made.fingerprint});
   return static_cast<int>(context_.scene.materials.size()) - 1;
 }
 

@@ -16,7 +16,7 @@ class MaterialReader {
   void check(pugi::xml_node node);
 
   /// Each element is read once. Throws SceneError.
-  BsdfPtr read(pugi::xml_node node);
+  BsdfPtr read(pugi::xml_node node) { return done(node).bsdf; }
 
   /// The index in Scene::materials of the element's BSDF, which is added when it is the first use.
   int use(pugi::xml_node node);
@@ -24,14 +24,20 @@ class MaterialReader {
   int useDefault(bool emits);
 
  private:
-  BsdfPtr make(pugi::xml_node node);
+  struct Made {
+    BsdfPtr bsdf;  ///< null while being read
+    std::uint64_t fingerprint = 0;
+  };
+  static Made makeDiffuseOf(float reflectance);
+  const Made& done(pugi::xml_node node);
+  Made make(pugi::xml_node node);
   /// Makes the file's name one from the scene's folder. Returns whether the file is there, if its lack is tolerated.
   bool resolveFile(pugi::xml_node node, Parameters& parameters);
-  int add(std::string name, BsdfPtr bsdf);
+  int add(std::string name, const Made& made);
 
   ReadContext& context_;
   TextureReader& textures_;
-  std::map<std::ptrdiff_t, BsdfPtr> done_;   // by place; null while being read
+  std::map<std::ptrdiff_t, Made> done_;      // by place
   std::map<std::ptrdiff_t, int> materials_;  // by place; the defaults at −1 and −2
   int unnamed_ = 0;
 };

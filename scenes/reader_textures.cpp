@@ -6,6 +6,7 @@
 
 #include "materials/bitmap.h"
 #include "materials/checkerboard.h"
+#include "materials/fingerprint.h"
 #include "scenes/reader_parameters.h"
 #include "scenes/values.h"
 
@@ -26,6 +27,13 @@ class ScaledTexture final : public Texture {
     const auto [smallest, largest] =
         std::minmax({low * nested.smallest, low * nested.largest, high * nested.smallest, high * nested.largest});
     return {smallest, largest};
+  }
+  std::uint64_t fingerprint() const override {
+    Fingerprint hash;
+    hash.text("scale");
+    hash.number(nested_->fingerprint());
+    hash.coefficients(scale_);
+    return hash.value();
   }
 
  private:

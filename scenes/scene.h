@@ -80,6 +80,8 @@ struct ShapeGroup {
 struct Material {
   std::string name;  ///< the file's id, or "unnamed-N"
   BsdfPtr bsdf;
+  /// Of what the BSDF was made from: equal for materials that are made alike, on every run.
+  std::uint64_t fingerprint = 0;
 };
 
 /// Radiance from infinitely far, in latitude-longitude form. The image point (u, v), v down, shows the radiance that

@@ -54,11 +54,11 @@ std::string printable(const char (&kind)[4]) {
   return text;
 }
 
-void checkVersion(const Header& header, const std::string& name) {
-  if (header.major == kFormatMajor) return;
-  const bool newer = header.major > kFormatMajor;
+void checkVersion(const FileFormat& format, const Header& header, const std::string& name) {
+  if (header.major == format.major) return;
+  const bool newer = header.major > format.major;
   refuse(name, fmt::format("format version {}.{} is {} than this program's {}.{}: {}", header.major, header.minor,
-                           newer ? "newer" : "older", kFormatMajor, kFormatMinor,
+                           newer ? "newer" : "older", format.major, format.minor,
                            newer ? "use a newer Lobe" : "make the file again"));
 }
 
@@ -101,13 +101,12 @@ MappedFile::~MappedFile() {
   if (data_) ::munmap(const_cast<std::byte*>(data_), size_);
 }
 
-std::vector<std::byte> wrapPayload(const std::string& kind, std::span<const std::byte> payload) {
+std::vector<std::byte> wrapPayload(const FileFormat& format, std::span<const std::byte> payload) {
   Header header{};
-  if (kind.size() != sizeof(header.kind)) throw std::logic_error("the kind of a container has four letters");
   std::memcpy(header.magic, kMagic, sizeof(kMagic));
-  std::memcpy(header.kind, kind.data(), sizeof(header.kind));
-  header.major = kFormatMajor;
-  header.minor = kFormatMinor;
+  std::memcpy(header.kind, format.kind.data(), sizeof(header.kind));
+  header.major = format.major;
+  header.minor = format.minor;
   header.payloadSize = payload.size();
   header.hash = contentHash(header, payload);
   std::vector<std::byte> bytes(sizeof(header) + payload.size());
@@ -116,7 +115,7 @@ std::vector<std::byte> wrapPayload(const std::string& kind, std::span<const std:
   return bytes;
 }
 
-std::span<const std::byte> unwrapPayload(const std::string& kind, std::span<const std::byte> bytes,
+std::span<const std::byte> unwrapPayload(const FileFormat& format, std::span<const std::byte> bytes,
                                          const std::string& name) {
   if (bytes.empty()) refuse(name, "the file is empty");
   const std::size_t magicBytes = std::min(bytes.size(), sizeof(kMagic));
@@ -125,9 +124,9 @@ std::span<const std::byte> unwrapPayload(const std::string& kind, std::span<cons
   if (bytes.size() < sizeof(header))
     refuse(name, fmt::format("truncated: {} bytes, the header alone has {}", bytes.size(), sizeof(header)));
   std::memcpy(&header, bytes.data(), sizeof(header));
-  if (std::memcmp(header.kind, kind.data(), sizeof(header.kind)) != 0)
-    refuse(name, fmt::format("a Lobe file of kind '{}', expected '{}'", printable(header.kind), kind));
-  checkVersion(header, name);
+  if (std::memcmp(header.kind, format.kind.data(), sizeof(header.kind)) != 0)
+    refuse(name, fmt::format("a Lobe file of kind '{}', expected '{}'", printable(header.kind), nameOf(format)));
+  checkVersion(format, header, name);
   const std::span<const std::byte> payload = bytes.subspan(sizeof(header));
   if (header.payloadSize != payload.size())
     refuse(name, fmt::format("{}: {} bytes, expected {}", payload.size() < header.payloadSize ? "truncated" : "damaged",
@@ -140,6 +139,12 @@ ContainerHeader containerHeader(std::span<const std::byte> bytes) {
   Header header;
   std::memcpy(&header, bytes.data(), sizeof(header));
   return {header.major, header.minor, header.hash};
+}
+
+bool isOfKind(const FileFormat& format, std::span<const std::byte> bytes) {
+  constexpr std::size_t kindAt = offsetof(Header, kind);
+  return bytes.size() >= kindAt + format.kind.size() && std::memcmp(bytes.data(), kMagic, sizeof(kMagic)) == 0 &&
+         std::memcmp(bytes.data() + kindAt, format.kind.data(), format.kind.size()) == 0;
 }
 
 std::uint64_t hashText(const std::string& text) {

@@ -7,17 +7,27 @@
 //         16   payload size u64
 //         24   XXH3-64 of the payload, seeded with bytes 0 to 23 hashed the same way
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace lobe {
 
-inline constexpr std::uint16_t kFormatMajor = 3;
-inline constexpr std::uint16_t kFormatMinor = 0;
+/// What a file holds, and the version of it that this program writes and reads.
+struct FileFormat {
+  std::array<char, 4> kind;
+  std::uint16_t major, minor;
+};
+
+/// Its kind as text.
+inline std::string_view nameOf(const FileFormat& format) {
+  return {format.kind.data(), format.kind.size()};
+}
 
 /// A read-only memory map of a whole file. Move-only.
 class MappedFile {
@@ -34,13 +44,13 @@ class MappedFile {
   std::size_t size_ = 0;
 };
 
-/// Header and payload as the bytes of a file. kind: four letters.
-std::vector<std::byte> wrapPayload(const std::string& kind, std::span<const std::byte> payload);
+/// Header and payload as the bytes of a file.
+std::vector<std::byte> wrapPayload(const FileFormat& format, std::span<const std::byte> payload);
 
 /// Checks magic, kind, version, size and hash, in this order, and returns the payload (8-byte aligned where bytes are).
 /// Throws std::runtime_error: "NAME: what is wrong and what to do". A newer minor version is read, a newer major
 /// refused.
-std::span<const std::byte> unwrapPayload(const std::string& kind, std::span<const std::byte> bytes,
+std::span<const std::byte> unwrapPayload(const FileFormat& format, std::span<const std::byte> bytes,
                                          const std::string& name);
 
 /// What the header says.
@@ -51,6 +61,9 @@ struct ContainerHeader {
 
 /// Of bytes that unwrapPayload has accepted.
 ContainerHeader containerHeader(std::span<const std::byte> bytes);
+
+/// Whether bytes begin as a file of this kind does, of whatever version and however damaged further on.
+bool isOfKind(const FileFormat& format, std::span<const std::byte> bytes);
 
 /// XXH3-64 of text.
 std::uint64_t hashText(const std::string& text);

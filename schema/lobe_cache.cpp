@@ -1,16 +1,12 @@
 #include "schema/lobe_cache.h"
 
-#include <cmath>
-#include <stdexcept>
-
 #include <fmt/format.h>
 
 #include "lobe_generated.h"
+#include "schema/cache_checks.h"
 
 namespace lobe {
 namespace {
-
-const std::string kKind = "BRDF";
 
 // The structs of the schema have private fields, so sizes and alignments are compared here, and the order of the fields
 // by a test that writes with one and reads with the other.
@@ -20,36 +16,13 @@ static_assert(std::is_trivially_copyable_v<CacheComponent> && std::is_standard_l
 static_assert(std::is_trivially_copyable_v<CacheRecord> && std::is_standard_layout_v<CacheRecord>);
 
 constexpr std::uint8_t kLastGridKind = 1;
-constexpr double kWeightTolerance = 1e-4;
-// Single precision loses the determinant of anything flatter.
-constexpr double kMinRelativeDeterminant = 1e-7;
-
-[[noreturn]] void refuse(const std::string& name, const std::string& fault) {
-  throw std::runtime_error(fmt::format("{}: damaged: {}", name, fault));
-}
-
-bool finite(std::initializer_list<float> values) {
-  for (float v : values)
-    if (!std::isfinite(v)) return false;
-  return true;
-}
-
-void checkComponent(const CacheComponent& c, std::size_t index, const std::string& name) {
-  if (!finite({c.weight, c.meanX, c.meanY, c.covXX, c.covXY, c.covYY}))
-    refuse(name, fmt::format("component {} is not finite", index));
-  if (c.weight < 0) refuse(name, fmt::format("component {} has the negative weight {}", index, c.weight));
-  const double diagonal = static_cast<double>(c.covXX) * c.covYY;
-  const double determinant = diagonal - static_cast<double>(c.covXY) * c.covXY;
-  if (!(c.covXX > 0 && c.covYY > 0 && determinant > kMinRelativeDeterminant * diagonal))
-    refuse(name, fmt::format("the covariance of component {} is not positive definite", index));
-}
 
 void checkRecord(const CacheRecord& r, std::size_t index, std::span<const CacheComponent> components,
                  const std::string& name) {
   const auto require = [&](bool condition, const char* fault) {
-    if (!condition) refuse(name, fmt::format("record {}: {}", index, fault));
+    if (!condition) refuseDamaged(name, fmt::format("record {}: {}", index, fault));
   };
-  require(finite({r.integral, r.albedo, r.cosineMass, r.outside, r.nev, r.nevCoverage, r.worstRatio}),
+  require(allFinite({r.integral, r.albedo, r.cosineMass, r.outside, r.nev, r.nevCoverage, r.worstRatio}),
           "a number is not finite");
   require(r.integral >= 0 && r.albedo >= 0 && r.nev >= 0 && r.nevCoverage >= 0 && r.worstRatio >= 0,
           "a negative quantity");
@@ -57,19 +30,8 @@ void checkRecord(const CacheRecord& r, std::size_t index, std::span<const CacheC
   require(r.outside >= 0 && r.outside <= 1, "share outside the disc out of range");
   require(r.count <= kMaxCacheComponents, "number of components out of range");
   if (r.count == 0) return;
-  require(r.first <= components.size() && r.count <= components.size() - r.first, "components out of range");
-  double sum = 0;
-  for (const CacheComponent& c : components.subspan(r.first, r.count)) sum += c.weight;
-  require(std::abs(sum - 1) <= kWeightTolerance, "the weights do not sum to one");
-}
-
-const fb::LobeCache& verified(std::span<const std::byte> payload, const std::string& name) {
-  if (payload.size() >= FLATBUFFERS_MAX_BUFFER_SIZE) refuse(name, "too large");
-  if (reinterpret_cast<std::uintptr_t>(payload.data()) % 8 != 0) refuse(name, "not aligned to 8 bytes");
-  const auto* data = reinterpret_cast<const std::uint8_t*>(payload.data());
-  flatbuffers::Verifier verifier(data, payload.size());
-  if (!fb::VerifyLobeCacheBuffer(verifier)) refuse(name, "the structure is not that of a lobe cache");
-  return *fb::GetLobeCache(data);
+  require(componentsInRange(r.first, r.count, components), "components out of range");
+  require(weightsSumToOne(components.subspan(r.first, r.count)), "the weights do not sum to one");
 }
 
 LobeCacheInfo readInfo(const fb::LobeCache& cache) {
@@ -93,34 +55,27 @@ LobeCacheInfo readInfo(const fb::LobeCache& cache) {
   return info;
 }
 
-/// The elements of a vector of structs where they lie.
-template <class To, class From>
-std::span<const To> inPlace(const flatbuffers::Vector<const From*>& vector) {
-  static_assert(sizeof(To) == sizeof(From));
-  return {reinterpret_cast<const To*>(vector.Data()), vector.size()};
-}
-
 }  // namespace
 
 LobeCache::LobeCache(MappedFile file, const std::filesystem::path& path) : file_(std::move(file)) {
   const std::string name = path.string();
-  const std::span<const std::byte> payload = unwrapPayload(kKind, file_.bytes(), name);
+  const std::span<const std::byte> payload = unwrapPayload(kLobeFormat, file_.bytes(), name);
   header_ = containerHeader(file_.bytes());
-  const fb::LobeCache& cache = verified(payload, name);
+  const auto& cache = verifiedBuffer<fb::LobeCache>(payload, name, "lobe cache");
   info_ = readInfo(cache);
   records_ = inPlace<CacheRecord>(*cache.records());
   components_ = inPlace<CacheComponent>(*cache.components());
-  if (info_.gridKind > kLastGridKind) refuse(name, fmt::format("grid of unknown kind {}", info_.gridKind));
+  if (info_.gridKind > kLastGridKind) refuseDamaged(name, fmt::format("grid of unknown kind {}", info_.gridKind));
   lookup_ = {cache.lookup()->data(), cache.lookup()->size()};
   if (info_.gridCount < 1 || info_.gridCount != lookup_.size())
-    refuse(name, fmt::format("{} look-ups for a grid of {} directions", lookup_.size(), info_.gridCount));
-  for (std::size_t i = 0; i < components_.size(); ++i) checkComponent(components_[i], i, name);
+    refuseDamaged(name, fmt::format("{} look-ups for a grid of {} directions", lookup_.size(), info_.gridCount));
+  checkComponents(components_, name);
   for (std::size_t i = 0; i < records_.size(); ++i) {
     checkRecord(records_[i], i, components_, name);
-    if (records_[i].entry >= info_.gridCount) refuse(name, fmt::format("record {}: direction out of range", i));
+    if (records_[i].entry >= info_.gridCount) refuseDamaged(name, fmt::format("record {}: direction out of range", i));
   }
   for (std::uint32_t i = 0; i < lookup_.size(); ++i)
-    if (lookup_[i] >= records_.size()) refuse(name, fmt::format("look-up {}: record out of range", i));
+    if (lookup_[i] >= records_.size()) refuseDamaged(name, fmt::format("look-up {}: record out of range", i));
 }
 
 LobeCache LobeCache::open(const std::filesystem::path& path) {
@@ -151,7 +106,7 @@ std::vector<std::byte> encodeLobeCache(const LobeCacheInfo& info, std::span<cons
   builder.Finish(fb::CreateLobeCache(builder, toolVersion, model, key, info.modelRevision, summary, settings,
                                      info.gridKind, info.gridCount, lookupVector, info.quarter, recordVector,
                                      componentVector));
-  return wrapPayload(kKind, std::as_bytes(std::span(builder.GetBufferPointer(), builder.GetSize())));
+  return wrapPayload(kLobeFormat, std::as_bytes(std::span(builder.GetBufferPointer(), builder.GetSize())));
 }
 
 }  // namespace lobe

@@ -12,6 +12,8 @@
 
 namespace lobe {
 
+inline constexpr FileFormat kLobeFormat{{'B', 'R', 'D', 'F'}, 3, 0};
+
 // These two are read in place: their layout is the schema's (checked when compiled).
 struct CacheComponent {
   float weight, meanX, meanY, covXX, covXY, covYY;

@@ -22,6 +22,7 @@ class Waves final : public Texture {
   }
   Rgb mean() const override { return Rgb::Zero(); }
   TextureRange range() const override { return {-0.08f, 0.08f}; }
+  std::uint64_t fingerprint() const override { return 0; }
 };
 
 std::string messageOf(const std::string& type,

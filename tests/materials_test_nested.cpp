@@ -17,6 +17,7 @@ class Halves final : public Texture {
   Halves(const Rgb& left, const Rgb& right) : left_(left), right_(right) {}
   Rgb eval(const Vec2& uv) const override { return uv.x() < 0.5f ? left_ : right_; }
   Rgb mean() const override { return 0.5f * (left_ + right_); }
+  std::uint64_t fingerprint() const override { return 0; }
   TextureRange range() const override {
     return {std::min(luminance(left_), luminance(right_)), std::max(luminance(left_), luminance(right_))};
   }

@@ -1,5 +1,3 @@
-#include <unistd.h>
-
 #include <algorithm>
 #include <bit>
 #include <catch2/catch.hpp>
@@ -11,30 +9,16 @@
 #include <limits>
 #include <span>
 
-#include <xxhash.h>
-
 #include "lobe_generated.h"
 #include "schema/atomic_file.h"
 #include "schema/lobe_cache.h"
+#include "tests/schema_test_tools.h"
 
 using namespace lobe;
+using namespace lobe::test;
 namespace fs = std::filesystem;
 
 namespace {
-
-/// A folder of the test's own, removed at its end.
-struct TemporaryFolder {
-  fs::path path;
-  TemporaryFolder() {
-    std::string name = (fs::temp_directory_path() / "lobe-schema-XXXXXX").string();
-    REQUIRE(mkdtemp(name.data()) != nullptr);
-    path = name;
-  }
-  ~TemporaryFolder() { fs::remove_all(path); }
-  std::size_t fileCount() const {
-    return static_cast<std::size_t>(std::distance(fs::directory_iterator(path), fs::directory_iterator()));
-  }
-};
 
 struct Content {
   LobeCacheInfo info;
@@ -62,20 +46,6 @@ Content smallCache() {
   return c;
 }
 
-/// Makes header and hash right for whatever is in the bytes.
-void reseal(std::vector<std::byte>& bytes) {
-  const std::uint64_t size = bytes.size() - 32;
-  std::memcpy(bytes.data() + 16, &size, 8);
-  const std::uint64_t hash = XXH3_64bits_withSeed(bytes.data() + 32, size, XXH3_64bits(bytes.data(), 24));
-  std::memcpy(bytes.data() + 24, &hash, 8);
-}
-
-void setVersion(std::vector<std::byte>& bytes, std::uint16_t major, std::uint16_t minor) {
-  std::memcpy(bytes.data() + 8, &major, 2);
-  std::memcpy(bytes.data() + 10, &minor, 2);
-  reseal(bytes);
-}
-
 struct Opener {
   TemporaryFolder folder;
   fs::path path = folder.path / "cache.lobe";
@@ -94,10 +64,6 @@ struct Opener {
   std::string fault(const Content& content) const { return fault(content.encode()); }
 };
 
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
-
 }  // namespace
 
 TEST_CASE("schema: a cache reads back as written, in place") {
@@ -115,7 +81,7 @@ TEST_CASE("schema: a cache reads back as written, in place") {
   CHECK(cache.info().modelRevision == 3);
   CHECK(cache.info().settings == c.info.settings);
   CHECK(cache.bytes() == bytes.size());
-  CHECK(cache.header().major == kFormatMajor);
+  CHECK(cache.header().major == kLobeFormat.major);
   REQUIRE(cache.records().size() == 2);
   CHECK(std::ranges::equal(std::as_bytes(cache.records()), std::as_bytes(std::span(c.records))));
   CHECK(std::ranges::equal(std::as_bytes(cache.components()), std::as_bytes(std::span(c.components))));
@@ -201,11 +167,11 @@ TEST_CASE("schema: each kind of fault is named") {
 TEST_CASE("schema: a newer minor version is read, another major refused") {
   const Opener opener;
   std::vector<std::byte> bytes = smallCache().encode();
-  setVersion(bytes, kFormatMajor, kFormatMinor + 1);
+  setVersion(bytes, kLobeFormat.major, kLobeFormat.minor + 1);
   CHECK(opener.fault(bytes).empty());
-  setVersion(bytes, kFormatMajor + 1, 0);
+  setVersion(bytes, kLobeFormat.major + 1, 0);
   CHECK(contains(opener.fault(bytes), "use a newer Lobe"));
-  setVersion(bytes, kFormatMajor - 1, 0);
+  setVersion(bytes, kLobeFormat.major - 1, 0);
   CHECK(contains(opener.fault(bytes), "make the file again"));
 }
 

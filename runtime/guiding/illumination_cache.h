@@ -58,6 +58,7 @@ class IlluminationCache {
   IlluminationRecord unpacked(const PackedRecord& record) const;
   /// All records as they were given.
   std::vector<IlluminationRecord> records() const;
+  float unit() const { return unit_; }
   std::size_t bytes() const;
 
  private:

@@ -9,8 +9,10 @@
 #include <ImfDoubleAttribute.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
+#include <ImfInputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfStringAttribute.h>
+#include <ImfTestFile.h>
 #include <fmt/format.h>
 
 #include "schema/atomic_file.h"
@@ -99,6 +101,23 @@ void writeImage(const std::filesystem::path& path, const Image& image, const Ima
       throw std::runtime_error(fmt::format("{}: {}", path.string(), e.what()));
     }
   });
+}
+
+ImageAttributes readAttributes(const std::filesystem::path& path) {
+  ImageAttributes attributes;
+  if (!Imf::isOpenExrFile(path.c_str())) return attributes;
+  try {
+    const Imf::InputFile file(path.c_str());
+    for (auto entry = file.header().begin(); entry != file.header().end(); ++entry) {
+      if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&entry.attribute()))
+        attributes[entry.name()] = text->value();
+      else if (const auto* number = dynamic_cast<const Imf::DoubleAttribute*>(&entry.attribute()))
+        attributes[entry.name()] = number->value();
+    }
+  } catch (const std::exception& e) {
+    throw std::runtime_error(fmt::format("{}: {}", path.string(), e.what()));
+  }
+  return attributes;
 }
 
 }  // namespace lobe

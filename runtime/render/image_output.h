@@ -1,5 +1,5 @@
 #pragma once
-// Writes images.
+// Writes images, and reads what they say of themselves.
 
 #include <cstdint>
 #include <filesystem>
@@ -22,6 +22,10 @@ void checkImageName(const std::filesystem::path& path);
 /// Writes the whole file or none. .exr: 32-bit floating-point RGB, with the attributes; .png: 8-bit sRGB, clipped to
 /// [0, 1], attributes ignored. Throws std::runtime_error that names the file.
 void writeImage(const std::filesystem::path& path, const Image& image, const ImageAttributes& attributes = {});
+
+/// The numbers and texts among the attributes of an .exr file; none of other
+/// files. Throws std::runtime_error that names the file.
+ImageAttributes readAttributes(const std::filesystem::path& path);
 
 /// 8-bit RGB triples, row by row, as a PNG.
 void writePng(const std::filesystem::path& path, int width, int height, const std::vector<std::uint8_t>& rgb);

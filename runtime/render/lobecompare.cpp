@@ -1,4 +1,4 @@
-// lobecompare: how far images are from a reference.
+// lobecompare: how far images are from a reference, or what they are together.
 
 #include <cstdio>
 #include <filesystem>
@@ -12,6 +12,7 @@
 #include "runtime/render/error_map.h"
 #include "runtime/render/error_metrics.h"
 #include "runtime/render/image_output.h"
+#include "runtime/render/merge.h"
 #include "scenes/tool.h"
 
 namespace {
@@ -20,7 +21,7 @@ struct Arguments {
   std::string reference;
   std::vector<std::string> images;
   bool json = false;
-  std::string map;
+  std::string map, merge;
   int shrink = 1;
 };
 
@@ -30,18 +31,41 @@ struct Comparison {
 };
 
 void declare(CLI::App& app, Arguments& arguments) {
-  app.add_option("REFERENCE", arguments.reference, "The image to compare with")->required();
+  app.add_option("REFERENCE", arguments.reference, "The image to compare with; with --merge the first of the images")
+      ->required();
   app.add_option("IMAGE", arguments.images, "Images of the same size")->required();
-  app.add_flag("--json", arguments.json, "Print an array of objects instead of a table");
-  app.add_option("--map", arguments.map,
-                 fmt::format("Write the relative error of each pixel of the one image as a PNG, from {:g} (black) over "
-                             "blue, red and yellow to {:g} (white)",
-                             lobe::kMapLow, lobe::kMapHigh));
-  app.add_option("--shrink", arguments.shrink, "First average the reference over squares of so many pixels a side")
-      ->check(CLI::PositiveNumber);
+  auto* json = app.add_flag("--json", arguments.json, "Print an array of objects instead of a table");
+  auto* map = app.add_option(
+      "--map", arguments.map,
+      fmt::format("Write the relative error of each pixel of the one image as a PNG, from {:g} (black) over "
+                  "blue, red and yellow to {:g} (white)",
+                  lobe::kMapLow, lobe::kMapHigh));
+  auto* shrink =
+      app.add_option("--shrink", arguments.shrink, "First average the reference over squares of so many pixels a side")
+          ->check(CLI::PositiveNumber);
+  app.add_option("--merge", arguments.merge,
+                 "Write the mean of the images, weighted by their numbers of samples, as an .exr; compare nothing")
+      ->excludes(json)
+      ->excludes(map)
+      ->excludes(shrink);
+}
+
+std::vector<std::filesystem::path> all(const Arguments& arguments) {
+  std::vector<std::filesystem::path> paths{arguments.reference};
+  paths.insert(paths.end(), arguments.images.begin(), arguments.images.end());
+  return paths;
+}
+
+void checkMerge(const Arguments& arguments) {
+  if (std::filesystem::path(arguments.merge).extension() != ".exr")
+    throw lobe::UsageError("--merge is written as .exr, which says how many samples it has");
+  for (const auto& path : all(arguments))
+    if (std::filesystem::weakly_canonical(path) == std::filesystem::weakly_canonical(arguments.merge))
+      throw lobe::UsageError(fmt::format("{}: would be overwritten, it is named twice", arguments.merge));
 }
 
 void checkArguments(const Arguments& arguments) {
+  if (!arguments.merge.empty()) checkMerge(arguments);
   if (arguments.map.empty()) return;
   if (arguments.images.size() > 1) throw lobe::UsageError("--map shows one image, but several are given");
   if (std::filesystem::path(arguments.map).extension() != ".png") throw lobe::UsageError("--map is written as .png");
@@ -94,8 +118,14 @@ lobe::Image readReference(const Arguments& arguments) {
   }
 }
 
+void merge(const Arguments& arguments) {
+  const lobe::MergedImage merged = lobe::mergeImages(all(arguments));
+  lobe::writeImage(arguments.merge, merged.image, merged.attributes);
+}
+
 void run(const Arguments& arguments) {
   checkArguments(arguments);
+  if (!arguments.merge.empty()) return merge(arguments);
   const lobe::Image reference = readReference(arguments);
   std::vector<Comparison> comparisons;
   for (const std::string& name : arguments.images) comparisons.push_back(compare(reference, name, arguments.map));
@@ -110,6 +140,6 @@ void run(const Arguments& arguments) {
 int main(int argc, char** argv) {
   Arguments arguments;
   return lobe::runTool(
-      "lobecompare", "Errors of images against a reference, as numbers and as a map.", argc, argv,
-      [&](CLI::App& app) { declare(app, arguments); }, [&] { run(arguments); });
+      "lobecompare", "Errors of images against a reference, as numbers and as a map; or images put together.", argc,
+      argv, [&](CLI::App& app) { declare(app, arguments); }, [&] { run(arguments); });
 }

@@ -32,7 +32,9 @@ struct Options {
   int threads = 0;
 };
 
+/// --illumination goes with none of the options declared here.
 void declareTraining(CLI::App& app, RenderJob& job) {
+  app.option_defaults()->group("Training");
   TrainingPlan& plan = job.training;
   app.add_option("--train", plan.from, "What records learn from: photons, paths (of the camera) or both")
       ->transform(CLI::CheckedTransformer(trainFromNames()))
@@ -44,6 +46,12 @@ void declareTraining(CLI::App& app, RenderJob& job) {
       ->capture_default_str();
   app.add_option("--train-seconds", job.trainSeconds,
                  "No training pass starts after that (default: three tenths of --seconds; with --spp no limit)");
+  app.add_option("--save-illumination", job.saveIllumination, "Keep what was trained in this file (.illum)");
+  auto* stored = app.add_option("--illumination", job.illumination,
+                                "Use what an earlier run kept of the same scene, from whatever camera; do not train");
+  for (CLI::Option* option : app.get_options([](const CLI::Option* o) { return o->get_group() == "Training"; }))
+    if (option != stored) stored->excludes(option);
+  app.option_defaults()->group("Options");
 }
 
 void declare(CLI::App& app, Options& options) {
@@ -57,6 +65,9 @@ void declare(CLI::App& app, Options& options) {
       ->check(CLI::IsMember(kIntegratorNames))
       ->capture_default_str();
   app.add_option("--spp", job.samples, "Samples per pixel");
+  app.add_option("--sample-offset", job.sampleOffset,
+                 "First of these samples: parts of a picture for lobecompare --merge")
+      ->capture_default_str();
   app.add_option("--seconds", job.seconds, "Seconds of training and rendering, instead of --spp");
   app.add_option("--size", options.size, "WIDTHxHEIGHT in pixels, instead of the scene's");
   app.add_option("--max-depth", job.maxDepth, "Longest path in segments (default: no limit)");

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <limits>
 #include <memory>
 #include <numeric>
 #include <stdexcept>
@@ -23,6 +24,7 @@
 #include "runtime/render/path_integrator.h"
 #include "runtime/render/record_view.h"
 #include "runtime/render/renderer.h"
+#include "runtime/render/stored_illumination.h"
 #include "scenes/camera.h"
 #include "scenes/reader.h"
 #include "scenes/tool.h"
@@ -52,11 +54,11 @@ std::string quoted(const std::string& word) {
 /// Every file a job writes can be written and is a file of its own: better said now than after hours.
 void checkFiles(const RenderJob& job) {
   std::vector<std::filesystem::path> written = job.outputs;
-  for (const auto& path : {job.convergence, job.stats})
+  for (const auto& path : {job.convergence, job.stats, job.saveIllumination})
     if (!path.empty()) written.push_back(path);
   if (job.record) written.push_back(job.recordImage);
   std::map<std::filesystem::path, int> uses;
-  for (const auto& path : {job.scene, job.reference})
+  for (const auto& path : {job.scene, job.reference, job.illumination})
     if (!path.empty()) ++uses[std::filesystem::weakly_canonical(path)];
   for (const auto& path : written)
     if (++uses[std::filesystem::weakly_canonical(path)] > 1)
@@ -126,6 +128,8 @@ struct Guiding {
   std::optional<BrdfCaches> caches;
   TrainedIllumination training;
   std::optional<GuidedSampler> sampler;
+
+  const BrdfCaches* cachesOrNull() const { return caches ? &*caches : nullptr; }
 };
 
 /// What a run leaves besides the picture.
@@ -140,9 +144,10 @@ struct RunResult {
 
 /// What comes before.
 struct LoadTimes {
-  double reading = 0;   ///< the scene file, its meshes and images
-  double building = 0;  ///< acceleration structure and light tables
-  double embree = 0;    ///< Embree's share of it
+  double reading = 0;    ///< the scene file, its meshes and images
+  double building = 0;   ///< acceleration structure and light tables
+  double embree = 0;     ///< Embree's share of it
+  double restoring = 0;  ///< illumination from its file
 };
 
 class Stopwatch {
@@ -182,6 +187,7 @@ nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, c
           {"seconds_reading", load.reading},
           {"seconds_building", load.building},
           {"seconds_embree_build", load.embree},
+          {"seconds_restoring_illumination", load.restoring},
           {"seconds_total", run.seconds()},
           {"seconds_training", run.training().seconds},
           {"seconds_rendering", total.seconds},
@@ -206,27 +212,27 @@ ImageAttributes attributes(const RenderJob& job, const RunResult& run) {
   ImageAttributes all{{"software", fmt::format("Lobe {}", LOBE_VERSION)},
                       {"integrator", std::string(nameOf(job.integrator))},
                       {"seed", static_cast<double>(job.seed)},
-                      {"samples", static_cast<double>(run.render.total.samples)}};
+                      {"samples", static_cast<double>(run.render.total.samples)},
+                      {"sampleOffset", static_cast<double>(job.sampleOffset)}};
   if (run.guiding.caches) all["cacheHashes"] = fmt::format("{:016x}", fmt::join(run.guiding.caches->hashes(), " "));
   // A picture of so many samples is the same bytes on every run; one of so many seconds never is.
   if (job.seconds) all["seconds"] = run.seconds();
   return all;
 }
 
-void prepare(const RenderJob& job, const RenderScene& scene, const RayCamera& camera, Guiding& guiding) {
-  if (job.integrator == IntegratorKind::path) return;
+void train(const RenderJob& job, const RenderScene& scene, const RayCamera& camera, Guiding& guiding) {
   TrainingPlan plan = job.training;
   plan.seed = job.seed;
   plan.keepParticles = job.record.has_value();
   plan.seconds = job.trainSeconds.value_or(job.seconds ? kTrainingShare * *job.seconds : kInfinity);
   // Only time limits the passes where there is no other reason to stop.
   plan.passes = job.passes.value_or(plan.seconds < kInfinity ? std::numeric_limits<int>::max() : plan.passes);
-  const BrdfCaches* caches = guiding.caches ? &*guiding.caches : nullptr;
   const bool timed = plan.seconds < kInfinity;
   Progress progress("training", timed ? plan.seconds : plan.passes);
-  guiding.training = trainIllumination(scene, camera, caches, plan,
+  guiding.training = trainIllumination(scene, camera, guiding.cachesOrNull(), plan,
                                        [&](const PassReport& pass) { progress.advance(timed ? pass.seconds : 1.0); });
-  guiding.sampler.emplace(scene.scene, guiding.training.cache, caches);
+  if (!job.saveIllumination.empty())
+    saveIllumination(job.saveIllumination, guiding.training, plan, scene.scene, job.scene);
 }
 
 /// What --record asks for; its faults get the option's name.
@@ -258,7 +264,7 @@ std::unique_ptr<Integrator> makeIntegrator(const RenderJob& job, const RenderSce
 }
 
 RenderOptions renderOptions(const RenderJob& job, double trained) {
-  RenderOptions options{job.seed, job.samples, std::nullopt};
+  RenderOptions options{job.seed, job.samples, std::nullopt, job.sampleOffset};
   if (job.seconds) options.seconds = std::max(*job.seconds - trained, 1e-3);
   return options;
 }
@@ -283,6 +289,15 @@ void RenderJob::validate() const {
   };
   require(samples.has_value() != seconds.has_value(), "either --spp or --seconds has to be given");
   require(!samples || *samples >= 1, "--spp has to be at least 1");
+  require(sampleOffset >= 0, "--sample-offset has to be at least 0");
+  require(sampleOffset == 0 || samples,
+          "--sample-offset goes with --spp: samples of --seconds are not known beforehand");
+  require(!samples || *samples <= std::numeric_limits<int>::max() - sampleOffset,
+          fmt::format("--sample-offset and --spp together have to be at most {}", std::numeric_limits<int>::max()));
+  require(integrator != IntegratorKind::path || (illumination.empty() && saveIllumination.empty()),
+          "--illumination and --save-illumination are for guided and product, path has none");
+  require(illumination.empty() || saveIllumination.empty(),
+          "--save-illumination keeps what is trained, but with --illumination nothing is");
   require(!seconds || (*seconds > 0 && std::isfinite(*seconds)), "--seconds has to be over 0");
   require(!size || (size->first >= 1 && size->second >= 1 && std::int64_t{size->first} * size->second <= kMaxPixels),
           fmt::format("--size has to be at least 1x1 and at most {} pixels", kMaxPixels));
@@ -312,12 +327,19 @@ std::string lobefitCommand(const RenderJob& job) {
 void run(const RenderJob& job) {
   job.validate();
   checkFiles(job);
+  std::optional<IlluminationFile> stored;
+  if (!job.illumination.empty()) stored.emplace(IlluminationFile::open(job.illumination));
   LoadTimes load;
   const Stopwatch reading;
   const Scene scene = readFor(job);
   load.reading = reading.seconds();
   ConvergenceLog log(job, scene);
   Guiding guiding;
+  if (stored) {
+    const Stopwatch restoring;
+    guiding.training = restoreIllumination(*stored, job.illumination, scene);
+    load.restoring = restoring.seconds();
+  }
   if (job.integrator == IntegratorKind::product)
     guiding.caches.emplace(job.cacheFolder, lobeRequests(scene), lobefitCommand(job));
   const Stopwatch building;
@@ -328,7 +350,10 @@ void run(const RenderJob& job) {
   std::optional<Receiver> receiver;
   if (job.record)
     receiver = forRecord(job, [&] { return receiverAt(renderScene, camera, job.record->first, job.record->second); });
-  prepare(job, renderScene, camera, guiding);
+  if (job.integrator != IntegratorKind::path) {
+    if (!stored) train(job, renderScene, camera, guiding);
+    guiding.sampler.emplace(scene, guiding.training.cache, guiding.cachesOrNull());
+  }
   if (receiver) drawRecord(job, renderScene, *receiver, guiding.training);
 
   const std::unique_ptr<Integrator> integrator = makeIntegrator(job, renderScene, guiding);

@@ -25,6 +25,7 @@ struct RenderJob {
 
   IntegratorKind integrator = IntegratorKind::product;
   std::optional<int> samples;     ///< per pixel; or
+  int sampleOffset = 0;           ///< the first of the samples, of so many a pixel
   std::optional<double> seconds;  ///< of training and rendering together
   std::optional<std::pair<int, int>> size;
   std::optional<int> maxDepth;  ///< segments
@@ -33,6 +34,9 @@ struct RenderJob {
   TrainingPlan training;
   std::optional<int> passes;           ///< of training; by default the plan's, or without limit where time is one
   std::optional<double> trainSeconds;  ///< no pass starts after that; by default a share of seconds, else no limit
+
+  /// Trained before, instead of training; where to keep what is trained. Empty: neither.
+  std::filesystem::path illumination, saveIllumination;
 
   std::filesystem::path reference, convergence, stats;  ///< empty: not wanted
 

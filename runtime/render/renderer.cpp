@@ -101,6 +101,7 @@ void RenderOptions::validate() const {
   if (samples.has_value() == seconds.has_value())
     throw std::runtime_error("either a number of samples or a time has to be given, not both");
   if (samples && *samples < 1) throw std::runtime_error(fmt::format("samples per pixel: {} is not positive", *samples));
+  if (firstSample < 0) throw std::runtime_error(fmt::format("first sample: {} is negative", firstSample));
   if (seconds && !(*seconds > 0.0)) throw std::runtime_error(fmt::format("seconds: {} is not positive", *seconds));
 }
 
@@ -114,7 +115,8 @@ RenderResult render(const RayCamera& camera, const Integrator& integrator, Film&
   RenderProgress& progress = result.total;
   while (const int samples = plan.next(progress)) {
     const Clock::time_point start = Clock::now();
-    result.statistics += renderer.render({progress.samples, progress.samples + samples});
+    const int first = options.firstSample + progress.samples;
+    result.statistics += renderer.render({first, first + samples});
     progress.seconds += std::chrono::duration<double>(Clock::now() - start).count();
     progress.samples += samples;
     if (afterWave) afterWave(progress);

@@ -16,6 +16,7 @@ struct RenderOptions {
   std::uint64_t seed = 1;
   std::optional<int> samples;     ///< per pixel: the same image for a seed, on any number of threads
   std::optional<double> seconds;  ///< stops when another wave would not fit; at least one sample per pixel
+  int firstSample = 0;            ///< of the samples of every pixel; with it the number of samples fits an int
 
   /// Throws std::runtime_error that names the field.
   void validate() const;
@@ -34,8 +35,8 @@ struct RenderResult {
   RenderProgress total;
 };
 
-/// Adds samples to the film, which has the camera's size and is empty. Sample s of pixel i draws from the random stream
-/// (seed, i, s).
+/// Adds samples to the film, which has the camera's size and is empty. Sample s of pixel i, counted from firstSample,
+/// draws from the random stream (seed, i, s).
 RenderResult render(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options,
                     const AfterWave& afterWave = {});
 

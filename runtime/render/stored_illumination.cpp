@@ -1,0 +1,64 @@
+#include "runtime/render/stored_illumination.h"
+
+#include <algorithm>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "runtime/guiding/illumination_store.h"
+#include "scenes/scene_hash.h"
+#include "schema/atomic_file.h"
+
+namespace lobe {
+namespace {
+
+/// "kitchen/scene.xml": many scene files are called the same, and their folders differ.
+std::string nameOf(const std::filesystem::path& sceneFile) {
+  const std::filesystem::path whole = std::filesystem::weakly_canonical(sceneFile);
+  return (whole.parent_path().filename() / whole.filename()).string();
+}
+
+std::string nameOf(TrainFrom from) {
+  const std::map<std::string, TrainFrom> names = trainFromNames();
+  return std::ranges::find(names, from, [](const auto& entry) { return entry.second; })->first;
+}
+
+StoredTrainingSettings settingsOf(const TrainingPlan& plan, std::size_t passes) {
+  return {.from = nameOf(plan.from),
+          .passes = static_cast<std::uint32_t>(passes),
+          .photons = static_cast<std::uint32_t>(plan.photons),
+          .importons = static_cast<std::uint32_t>(plan.importons),
+          .components = static_cast<std::uint32_t>(plan.records.components),
+          .seed = plan.seed};
+}
+
+}  // namespace
+
+void saveIllumination(const std::filesystem::path& path, const TrainedIllumination& trained, const TrainingPlan& plan,
+                      const Scene& scene, const std::filesystem::path& sceneFile) {
+  IlluminationInfo info;
+  info.toolVersion = LOBE_VERSION;
+  info.scene = nameOf(sceneFile);
+  info.sceneHash = lightHash(scene);
+  info.settings = settingsOf(plan, trained.report.passes.size());
+  info.particles = trained.report.particles();
+  info.undersampledShare = trained.report.undersampledShare;
+  const std::vector<std::byte> bytes = storeIllumination(trained.cache, std::move(info));
+  writeAtomically(path, std::span<const std::byte>(bytes));
+}
+
+TrainedIllumination restoreIllumination(const IlluminationFile& file, const std::filesystem::path& path,
+                                        const Scene& scene) {
+  const IlluminationInfo& info = file.info();
+  const std::uint64_t hash = lightHash(scene);
+  if (hash != info.sceneHash)
+    throw std::runtime_error(fmt::format(
+        "{}: trained for another scene ({}, hash {:016x}; this one has {:016x}): train again, with --save-illumination",
+        path.string(), info.scene, info.sceneHash, hash));
+  TrainedIllumination trained;
+  trained.cache = loadIllumination(file);
+  trained.report.undersampledShare = info.undersampledShare;
+  return trained;
+}
+
+}  // namespace lobe

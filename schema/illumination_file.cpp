@@ -1,0 +1,101 @@
+#include "schema/illumination_file.h"
+
+#include <cmath>
+#include <numeric>
+
+#include <fmt/format.h>
+
+#include "illumination_generated.h"
+#include "schema/cache_checks.h"
+
+namespace lobe {
+namespace {
+
+static_assert(sizeof(StoredIllumination) == sizeof(fb::IlluminationRecord));
+static_assert(std::is_trivially_copyable_v<StoredIllumination> && std::is_standard_layout_v<StoredIllumination>);
+
+constexpr float kFrameTolerance = 1e-3f;
+
+using Vector = std::array<float, 3>;
+
+float dot(const Vector& a, const Vector& b) {
+  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0f);
+}
+
+bool isUnit(const Vector& v) {
+  return std::abs(dot(v, v) - 1) <= kFrameTolerance;
+}
+
+void checkRecord(const StoredIllumination& r, std::size_t index, std::span<const CacheComponent> components,
+                 const std::string& name) {
+  const auto require = [&](bool condition, const char* fault) {
+    if (!condition) refuseDamaged(name, fmt::format("record {}: {}", index, fault));
+  };
+  require(allFinite({r.position[0], r.position[1], r.position[2], r.radius, r.irradiance, r.samples}),
+          "a number is not finite");
+  // Written so that what is not finite fails.
+  require(isUnit(r.normal) && isUnit(r.tangent) && std::abs(dot(r.normal, r.tangent)) <= kFrameTolerance,
+          "normal and tangent are not a frame's");
+  require(r.radius > 0, "the radius is not positive");
+  require(r.background >= 0 && r.background <= 1, "share of the background out of range");
+  require(r.irradiance >= 0, "a negative irradiance");
+  require(r.samples >= 0, "a negative number of samples");
+  require(r.count <= kMaxStoredComponents, "number of components out of range");
+  require(componentsInRange(r.first, r.count, components), "components out of range");
+  require(r.count == 0 || weightsSumToOne(components.subspan(r.first, r.count)), "the weights do not sum to one");
+}
+
+IlluminationInfo readInfo(const fb::Illumination& file) {
+  const fb::TrainingSettings& s = *file.settings();
+  return {.toolVersion = file.tool_version()->str(),
+          .scene = file.scene()->str(),
+          .sceneHash = file.scene_hash(),
+          .settings = {s.from()->str(), s.passes(), s.photons(), s.importons(), s.components(), s.seed()},
+          .particles = file.particles(),
+          .undersampledShare = file.undersampled_share(),
+          .unit = file.unit()};
+}
+
+}  // namespace
+
+IlluminationFile::IlluminationFile(MappedFile file, const std::filesystem::path& path) : file_(std::move(file)) {
+  const std::string name = path.string();
+  const std::span<const std::byte> payload = unwrapPayload(kIlluminationFormat, file_.bytes(), name);
+  header_ = containerHeader(file_.bytes());
+  const auto& root = verifiedBuffer<fb::Illumination>(payload, name, "trained illumination");
+  info_ = readInfo(root);
+  records_ = inPlace<StoredIllumination>(*root.records());
+  components_ = inPlace<CacheComponent>(*root.components());
+  if (!(info_.unit > 0 && std::isfinite(info_.unit))) refuseDamaged(name, "the unit of length is not positive");
+  if (!(info_.undersampledShare >= 0 && info_.undersampledShare <= 1))
+    refuseDamaged(name, "share of undersampled records out of range");
+  checkComponents(components_, name);
+  for (std::size_t i = 0; i < records_.size(); ++i) {
+    checkRecord(records_[i], i, components_, name);
+    // The look-up table has a cell a unit: a radius of many would fill the memory.
+    if (records_[i].radius > info_.unit) refuseDamaged(name, fmt::format("record {}: radius over the unit", i));
+  }
+}
+
+IlluminationFile IlluminationFile::open(const std::filesystem::path& path) {
+  return IlluminationFile(MappedFile(path), path);
+}
+
+std::vector<std::byte> encodeIllumination(const IlluminationInfo& info, std::span<const StoredIllumination> records,
+                                          std::span<const CacheComponent> components) {
+  flatbuffers::FlatBufferBuilder builder(1024 + records.size_bytes() + components.size_bytes());
+  const StoredTrainingSettings& s = info.settings;
+  const auto settings = fb::CreateTrainingSettings(builder, builder.CreateString(s.from), s.passes, s.photons,
+                                                   s.importons, s.components, s.seed);
+  const auto toolVersion = builder.CreateString(info.toolVersion);
+  const auto scene = builder.CreateString(info.scene);
+  const auto recordVector =
+      builder.CreateVectorOfStructs(reinterpret_cast<const fb::IlluminationRecord*>(records.data()), records.size());
+  const auto componentVector =
+      builder.CreateVectorOfStructs(reinterpret_cast<const fb::Component*>(components.data()), components.size());
+  builder.Finish(fb::CreateIllumination(builder, toolVersion, scene, info.sceneHash, settings, info.particles,
+                                        info.undersampledShare, info.unit, recordVector, componentVector));
+  return wrapPayload(kIlluminationFormat, std::as_bytes(std::span(builder.GetBufferPointer(), builder.GetSize())));
+}
+
+}  // namespace lobe

@@ -1,0 +1,75 @@
+#pragma once
+// The illumination cache on disk (".illum"): what was learnt about one scene's light. See illumination.fbs for the
+// meaning of each number.
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "schema/lobe_cache.h"
+
+namespace lobe {
+
+inline constexpr FileFormat kIlluminationFormat{{'I', 'L', 'L', 'U'}, 1, 0};
+
+/// Read in place: the layout is the schema's (checked when compiled, the order of the fields by a test). A new field
+/// goes here, into illumination.fbs, the checks of illumination_file.cpp and runtime/guiding/illumination_store.cpp.
+struct StoredIllumination {
+  std::array<float, 3> position, normal, tangent;
+  float radius, background, irradiance, samples;
+  std::uint32_t first, count;
+};
+
+/// Largest number of components of a record that a file may hold.
+inline constexpr std::uint32_t kMaxStoredComponents = 8;
+
+struct StoredTrainingSettings {
+  std::string from = "both";
+  std::uint32_t passes = 0, photons = 0, importons = 0, components = 0;
+  std::uint64_t seed = 0;
+  bool operator==(const StoredTrainingSettings&) const = default;
+};
+
+/// What a file says of itself.
+struct IlluminationInfo {
+  std::string toolVersion, scene;
+  std::uint64_t sceneHash = 0;
+  StoredTrainingSettings settings;
+  std::uint64_t particles = 0;
+  double undersampledShare = 0;
+  float unit = 1;
+};
+
+/// An open file: mapped, checked, with its records in place. Immutable; move-only.
+class IlluminationFile {
+ public:
+  /// Maps, verifies the structure, then the meaning: indices in range, unit normals and tangents, positive radii,
+  /// weights that sum to one, positive definite covariances, finite numbers. Throws std::runtime_error that names the
+  /// file and the fault.
+  static IlluminationFile open(const std::filesystem::path& path);
+
+  const IlluminationInfo& info() const { return info_; }
+  std::span<const StoredIllumination> records() const { return records_; }
+  std::span<const CacheComponent> components(const StoredIllumination& r) const {
+    return components_.subspan(r.first, r.count);
+  }
+  const ContainerHeader& header() const { return header_; }
+  std::size_t bytes() const { return file_.bytes().size(); }
+
+ private:
+  IlluminationFile(MappedFile file, const std::filesystem::path& path);
+  MappedFile file_;
+  IlluminationInfo info_;
+  std::span<const StoredIllumination> records_;
+  std::span<const CacheComponent> components_;
+  ContainerHeader header_{};
+};
+
+/// The bytes of a file; the same input gives the same bytes.
+std::vector<std::byte> encodeIllumination(const IlluminationInfo& info, std::span<const StoredIllumination> records,
+                                          std::span<const CacheComponent> components);
+
+}  // namespace lobe
