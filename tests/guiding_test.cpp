@@ -222,6 +222,21 @@ TEST_CASE("guiding: the nearest particles are found, all of them") {
   }
 }
 
+TEST_CASE("guiding: particles behind a thin wall take no places") {
+  Rng rng(8);
+  std::vector<Particle> particles;
+  for (int i = 0; i < 20000; ++i) {
+    const float side = i % 100 == 0 ? 1.0f : -1.0f;
+    const Vec3 up = side * Vec3::UnitZ();
+    particles.push_back({Vec3(rng.uniform(), rng.uniform(), 0), up, up, 1.0f, 1.0f});
+  }
+  const std::span<const Particle> source = particles;
+  const ParticleNeighbours neighbours(std::span(&source, 1), 50, 1.0f);
+  const Neighbourhood found = neighbours.around({0.5f, 0.5f, 0}, Vec3::UnitZ(), Vec3::UnitX());
+  CHECK(found.points.size() == 50);
+  CHECK(found.radius == Approx(std::sqrt(50 / (200 * M_PI))).epsilon(0.2));
+}
+
 TEST_CASE("guiding: bad training options are refused by name") {
   TrainingOptions options;
   options.components = 9;

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 
+#include <tbb/parallel_for.h>
 #include <Eigen/Geometry>
 #include <nanoflann.hpp>
 
@@ -30,8 +32,9 @@ struct ParticlePositions {
 using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, ParticlePositions>,
                                                    ParticlePositions, 3, std::uint32_t>;
 
-/// The nearest `count` points in no order. nanoflann's own set keeps them sorted, which costs more than the search:
-/// this one collects twice as many and then drops the farther half.
+/// The nearest `count` particles on the side of a normal, in no order. Those of other sides are not taken in at all:
+/// behind a thin wall there may be so many that they would leave no place. nanoflann's own set keeps what it finds
+/// sorted, which costs more than the search: this one collects twice as many and then drops the farther half.
 class NearestSet {
  public:
   using DistanceType = float;
@@ -40,7 +43,8 @@ class NearestSet {
     std::uint32_t index;
   };
 
-  NearestSet(std::size_t count, float maxDistance2) : count_(count), worst_(maxDistance2) {
+  NearestSet(std::span<const Particle> particles, const Vec3& n, std::size_t count, float maxDistance2)
+      : particles_(particles), n_(n), count_(count), worst_(maxDistance2) {
     neighbours_.reserve(2 * count);
   }
 
@@ -55,6 +59,8 @@ class NearestSet {
   float worstDist() const { return worst_; }
   bool addPoint(float distance2, std::uint32_t index) {
     if (distance2 >= worst_) return true;
+    const Particle& p = particles_[index];
+    if (p.normal.dot(n_) < kNeighbourNormalCosine || p.direction.dot(n_) <= 0) return true;
     neighbours_.push_back({distance2, index});
     if (neighbours_.size() == 2 * count_) drop();
     return true;
@@ -71,6 +77,8 @@ class NearestSet {
     worst_ = neighbours_.back().distance2;
   }
 
+  std::span<const Particle> particles_;
+  const Vec3 n_;
   std::size_t count_;
   float worst_;
   std::vector<Neighbour> neighbours_;
@@ -92,15 +100,14 @@ class ParticleNeighbours::Tree {
       : positions_{particles}, count_(count), maxDistance2_(maxDistance * maxDistance), tree_(3, positions_, {16}) {}
 
   Tally collect(const Vec3& x, const Vec3& n, const Vec3& tangent, std::vector<WeightedPoint>& points) const {
-    NearestSet nearest(count_, maxDistance2_);
+    NearestSet nearest(positions_.particles, n, count_, maxDistance2_);
     tree_.findNeighbors(nearest, x.data(), nanoflann::SearchParams());
     const Vec3 bitangent = n.cross(tangent);
     Tally tally;
     for (const NearestSet::Neighbour& neighbour : nearest.finish()) {
       const Particle& p = positions_.particles[neighbour.index];
-      const float cosine = p.direction.dot(n);
-      if (p.normal.dot(n) < kNeighbourNormalCosine || cosine <= 0) continue;
-      points.push_back({toDisc({p.direction.dot(tangent), p.direction.dot(bitangent), cosine}), p.weight});
+      const Vec3 local(p.direction.dot(tangent), p.direction.dot(bitangent), p.direction.dot(n));
+      points.push_back({toDisc(local), p.weight});
       tally.radius2 = std::max(tally.radius2, neighbour.distance2);
       tally.weight += p.weight;
       tally.squares += static_cast<double>(p.weight) * p.weight;
@@ -119,8 +126,11 @@ class ParticleNeighbours::Tree {
 
 ParticleNeighbours::ParticleNeighbours(std::span<const std::span<const Particle>> sources, int count,
                                        float maxDistance) {
-  for (const std::span<const Particle>& source : sources)
-    if (!source.empty()) trees_.push_back(std::make_unique<Tree>(source, count, maxDistance));
+  std::vector<std::span<const Particle>> filled;
+  std::ranges::copy_if(sources, std::back_inserter(filled), [](const auto& source) { return !source.empty(); });
+  trees_.resize(filled.size());
+  tbb::parallel_for(std::size_t{0}, filled.size(),
+                    [&](std::size_t i) { trees_[i] = std::make_unique<Tree>(filled[i], count, maxDistance); });
 }
 
 ParticleNeighbours::~ParticleNeighbours() = default;

@@ -34,8 +34,8 @@ class ParticleNeighbours {
   /// No source has a particle.
   bool empty() const { return trees_.empty(); }
 
-  /// The nearest particles, of which those count that arrived on the side of n at a surface turned less than 45° from
-  /// it. n, tangent: unit, orthogonal.
+  /// The nearest particles of those that arrived on the side of n at a surface turned less than 45° from it. n,
+  /// tangent: unit, orthogonal.
   Neighbourhood around(const Vec3& x, const Vec3& n, const Vec3& tangent) const;
 
  private:

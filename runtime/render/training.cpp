@@ -5,6 +5,8 @@
 #include <chrono>
 #include <stdexcept>
 
+#include <oneapi/tbb/parallel_invoke.h>
+
 namespace lobe {
 namespace {
 
@@ -51,12 +53,14 @@ class Training {
       guide_->update();
     }
     samples_ = std::move(importons.samples);
-    if (wishes_.importance) {
-      PhotonResult photons = tracer_->tracePhotons(pass, plan_.photons);
-      photons_ = std::move(photons.particles);
-      importance_.learn(std::array{std::span<const Particle>(importons.importance)}, photons.requests);
-    }
-    PassReport report{0, photons_.size() + samples_.size(), 0, radiance_.learn(sources(), importons.requests)};
+    PhotonResult photons;
+    if (wishes_.importance) photons = tracer_->tracePhotons(pass, plan_.photons);
+    photons_ = std::move(photons.particles);
+    PassReport report{0, photons_.size() + samples_.size(), 0, std::nullopt};
+    // Side by side: what one has to do in order leaves room for the other.
+    oneapi::tbb::parallel_invoke(
+        [&] { importance_.learn(std::array{std::span<const Particle>(importons.importance)}, photons.requests); },
+        [&] { report.logLikelihood = radiance_.learn(sources(), importons.requests); });
     report.records = radiance_.cache().size();
     report.seconds = watch.seconds();
     return report;
