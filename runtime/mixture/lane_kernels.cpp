@@ -18,21 +18,28 @@ namespace lobe::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// The variance of y at a given x, for all components of a reflectance.
-void conditionalVariances(const LanesView& mixture, float* out) {
-  const hn::CappedTag<float, kMostLanes> d;
+// The variance of y at a given x.
+template <class D>
+HWY_INLINE hn::Vec<D> conditionalVariance(D d, hn::Vec<D> across) {
+  return hn::Mul(hn::Set(d, kHalfLog2e), reciprocal(d, hn::Neg(across)));
+}
+
+// The same for all components of a reflectance.
+template <class D>
+HWY_INLINE void conditionalVariances(D d, LanesView mixture, float* out) {
   for (int k = 0; k < mixture.count; k += static_cast<int>(hn::Lanes(d)))
-    hn::StoreU(hn::Div(hn::Set(d, -kHalfLog2e), hn::LoadU(d, mixture.field(LaneField::across) + k)), d, out + k);
+    hn::StoreU(conditionalVariance(d, hn::LoadU(d, mixture.field(LaneField::across) + k)), d, out + k);
 }
 
 // The columns of one set of lanes of the light.
 template <class D>
-HWY_INLINE hn::Vec<D> pairColumns(D d, const LanesView& reflectance, const float* variances, float constant,
-                                  const LanesView& light, int first, float* pairs) {
+HWY_INLINE hn::Vec<D> pairColumns(D d, LanesView reflectance, const float* variances, float constant, LanesView light,
+                                  int first, float* pairs) {
   const auto two = [&](LaneField f) { return hn::LoadU(d, light.field(f) + first); };
   const auto x2 = two(LaneField::x), y2 = two(LaneField::y), slope2 = two(LaneField::slope), xx2 = two(LaneField::xx),
              xy2 = two(LaneField::xy), weight2 = two(LaneField::weight);
-  const auto variance2 = hn::Div(hn::Set(d, -kHalfLog2e), two(LaneField::across));
+  const auto scale2 = hn::Mul(weight2, hn::Set(d, 0.5f * std::numbers::inv_pi_v<float>));
+  const auto variance2 = conditionalVariance(d, two(LaneField::across));
   auto sum = hn::Mul(hn::Set(d, constant), weight2);
   hn::StoreU(sum, d, pairs + reflectance.count * light.stride + first);
   for (int i = 0; i < reflectance.count; ++i) {
@@ -44,12 +51,10 @@ HWY_INLINE hn::Vec<D> pairColumns(D d, const LanesView& reflectance, const float
         hn::MulAdd(hn::Add(hn::Set(d, variances[i]), variance2), sxx, hn::Mul(hn::Mul(xx1, xx2), hn::Mul(bend, bend)));
     const auto dx = hn::Sub(one(LaneField::x), x2), dy = hn::Sub(one(LaneField::y), y2);
     const auto across = hn::NegMulAdd(sxy, dx, hn::Mul(dy, sxx));  // (dy − slope dx) S_xx
-    const auto inverse = hn::Div(hn::Set(d, 1.0f), hn::Mul(sxx, determinant));
-    const auto square = hn::Mul(inverse, hn::MulAdd(across, across, hn::Mul(hn::Mul(dx, dx), determinant)));
-    const auto height = hn::Sqrt(hn::Mul(inverse, sxx));  // 1/sqrt|S|
-    const auto weight =
-        hn::Mul(hn::Set(d, reflectance.field(LaneField::weight)[i] * 0.5f * std::numbers::inv_pi_v<float>),
-                hn::Mul(weight2, height));
+    const auto height = reciprocalRoot(d, determinant);            // 1/sqrt|S|
+    const auto lean = hn::Mul(across, height);
+    const auto square = hn::Mul(reciprocal(d, sxx), hn::MulAdd(lean, lean, hn::Mul(dx, dx)));
+    const auto weight = hn::Mul(hn::Mul(hn::Set(d, reflectance.field(LaneField::weight)[i]), height), scale2);
     const auto mass = hn::Mul(weight, exp2Negative(d, hn::Mul(hn::Set(d, -kHalfLog2e), square)));
     hn::StoreU(mass, d, pairs + i * light.stride + first);
     sum = hn::Add(sum, mass);
@@ -58,10 +63,10 @@ HWY_INLINE hn::Vec<D> pairColumns(D d, const LanesView& reflectance, const float
 }
 
 template <class D>
-HWY_INLINE float pairMassesBy(D d, const LanesView& reflectance, float constant, const LanesView& light, float* pairs,
+HWY_INLINE float pairMassesBy(D d, LanesView reflectance, float constant, LanesView light, float* pairs,
                               float* columns) {
   HWY_ALIGN std::array<float, kMaxReflectanceComponents + kMostLanes> variances;
-  conditionalVariances(reflectance, variances.data());
+  conditionalVariances(d, reflectance, variances.data());
   auto total = hn::Zero(d);
   for (int j = 0; j < light.stride; j += static_cast<int>(hn::Lanes(d))) {
     const auto sum = pairColumns(d, reflectance, variances.data(), constant, light, j, pairs);
@@ -78,7 +83,7 @@ float PairMasses(const LanesView& reflectance, float constant, const LanesView& 
 }
 
 template <class D>
-HWY_INLINE hn::Vec<D> densityOf(D d, const LanesView& lanes, int first, hn::Vec<D> x, hn::Vec<D> y) {
+HWY_INLINE hn::Vec<D> densityOf(D d, LanesView lanes, int first, hn::Vec<D> x, hn::Vec<D> y) {
   const auto at = [&](LaneField f) { return hn::LoadU(d, lanes.field(f) + first); };
   const auto dx = hn::Sub(x, at(LaneField::x));
   const auto dy = hn::NegMulAdd(at(LaneField::slope), dx, hn::Sub(y, at(LaneField::y)));
@@ -88,7 +93,7 @@ HWY_INLINE hn::Vec<D> densityOf(D d, const LanesView& lanes, int first, hn::Vec<
 }
 
 template <class D>
-HWY_INLINE float lightDensityBy(D d, const LanesView& light, float px, float py) {
+HWY_INLINE float lightDensityBy(D d, LanesView light, float px, float py) {
   const auto x = hn::Set(d, px), y = hn::Set(d, py);
   auto sum = hn::Zero(d);
   for (int j = 0; j < light.stride; j += static_cast<int>(hn::Lanes(d)))
@@ -102,7 +107,7 @@ HWY_INLINE float lightDensityAt(const LanesView& light, float x, float y) {
 }
 
 template <class D>
-HWY_INLINE float reflectanceDensityBy(D d, const LanesView& reflectance, float px, float py) {
+HWY_INLINE float reflectanceDensityBy(D d, LanesView reflectance, float px, float py) {
   const auto x = hn::Set(d, px), y = hn::Set(d, py);
   auto sum = hn::Zero(d);
   for (int i = 0; i < reflectance.count; i += static_cast<int>(hn::Lanes(d))) {
@@ -146,7 +151,7 @@ HWY_INLINE hn::Vec<D> largestStep(D d, hn::Vec<D> x, hn::Vec<D> y, const Step<D>
 }
 
 template <class D>
-HWY_INLINE void placeBy(D d, const LanesView& mixture, const Placement& p, float* out, int stride, int first) {
+HWY_INLINE void placeBy(D d, LanesView mixture, const Placement& p, float* out, int stride, int first) {
   const Step<D> step(d, p);
   const auto cosine = hn::Set(d, p.cosine), sine = hn::Set(d, p.sine);
   const auto factor = hn::Set(d, p.factor), half = hn::Set(d, -kHalfLog2e);
