@@ -111,12 +111,15 @@ TEST_CASE("lanes: masses of pairs are those of the definition, down to the least
       std::vector<float> pairs(stride * (f.one.size() + 1)), columns(stride);
       const float mass = pairMasses(one.view(), f.constant, two.view(), pairs.data(), columns.data());
       CHECK(mass == Approx(exactMass(f.one, f.constant, f.two)).epsilon(5e-6));
+      double sum = 0;
       for (std::size_t j = 0; j < stride; ++j) {
         double column = 0;
         for (std::size_t k = 0; k <= f.one.size(); ++k) column += pairs[k * stride + j];
-        CHECK(columns[j] == Approx(column).epsilon(1e-5));
-        if (j >= f.two.size()) CHECK(columns[j] == 0);
+        if (j >= f.two.size()) CHECK(column == 0);
+        sum += column;
+        CHECK(columns[j] == Approx(sum).epsilon(1e-5));
       }
+      CHECK(mass == columns.back());
       for (std::size_t k = 0; k < f.one.size(); ++k)
         for (std::size_t j = 0; j < f.two.size(); ++j) {
           const double exact = exactPair(f.one[k], f.two[j]);

@@ -62,24 +62,55 @@ HWY_INLINE hn::Vec<D> pairColumns(D d, LanesView reflectance, const float* varia
   return sum;
 }
 
+// Makes running sums of the numbers; returns the last.
+HWY_INLINE float sumUp(float* values, int count) {
+  const hn::CappedTag<float, kLaneStep> d;
+  auto sum = hn::Zero(d);
+  for (int k = 0; k < count; k += kLaneStep) {
+    auto v = hn::LoadU(d, values + k);
+    v = hn::Add(v, hn::ShiftLeftLanes<1>(d, v));
+    v = hn::Add(v, hn::ShiftLeftLanes<2>(d, v));
+    v = hn::Add(v, sum);
+    hn::StoreU(v, d, values + k);
+    sum = hn::Broadcast<kLaneStep - 1>(v);
+  }
+  return hn::GetLane(sum);
+}
+
 template <class D>
 HWY_INLINE float pairMassesBy(D d, LanesView reflectance, float constant, LanesView light, float* pairs,
                               float* columns) {
   HWY_ALIGN std::array<float, kMaxReflectanceComponents + kMostLanes> variances;
   conditionalVariances(d, reflectance, variances.data());
-  auto total = hn::Zero(d);
-  for (int j = 0; j < light.stride; j += static_cast<int>(hn::Lanes(d))) {
-    const auto sum = pairColumns(d, reflectance, variances.data(), constant, light, j, pairs);
-    hn::StoreU(sum, d, columns + j);
-    total = hn::Add(total, sum);
-  }
-  return hn::GetLane(hn::SumOfLanes(d, total));
+  for (int j = 0; j < light.stride; j += static_cast<int>(hn::Lanes(d)))
+    hn::StoreU(pairColumns(d, reflectance, variances.data(), constant, light, j, pairs), d, columns + j);
+  return sumUp(columns, light.stride);
 }
 
 float PairMasses(const LanesView& reflectance, float constant, const LanesView& light, float* pairs, float* columns) {
   if (light.stride == kLaneStep)
     return pairMassesBy(hn::CappedTag<float, kLaneStep>(), reflectance, constant, light, pairs, columns);
   return pairMassesBy(hn::CappedTag<float, kMostLanes>(), reflectance, constant, light, pairs, columns);
+}
+
+// Without branches that depend on chance: the machine would guess them wrong.
+PairIndex ChoosePair(const float* pairs, const float* columns, int rows, int stride, float choice) {
+  const hn::CappedTag<float, kLaneStep> d;
+  float left = choice * columns[stride - 1];  // less than all
+  int column = 0;
+  for (int j = 0; j < stride; j += kLaneStep)
+    column += static_cast<int>(hn::CountTrue(d, hn::Le(hn::LoadU(d, columns + j), hn::Set(d, left))));
+  if (column > 0) left -= columns[column - 1];
+  const float* masses = pairs + column;
+  float sum = 0;
+  int row = 0;
+  for (int i = 0; i < rows; ++i) {
+    sum += masses[i * stride];
+    row += sum <= left ? 1 : 0;
+  }
+  // Rounding may leave a little at the end: then the last pair that has mass is taken.
+  while (row == rows || !(masses[row * stride] > 0)) --row;
+  return {row, column};
 }
 
 template <class D>
@@ -201,6 +232,7 @@ namespace lobe {
 
 namespace {
 HWY_EXPORT(PairMasses);
+HWY_EXPORT(ChoosePair);
 HWY_EXPORT(LightDensity);
 HWY_EXPORT(BothDensities);
 HWY_EXPORT(PlaceMixture);
@@ -208,6 +240,10 @@ HWY_EXPORT(PlaceMixture);
 
 float pairMasses(const LanesView& reflectance, float constant, const LanesView& light, float* pairs, float* columns) {
   return HWY_DYNAMIC_DISPATCH(PairMasses)(reflectance, constant, light, pairs, columns);
+}
+
+PairIndex choosePair(const float* pairs, const float* columns, int rows, int stride, float choice) {
+  return HWY_DYNAMIC_DISPATCH(ChoosePair)(pairs, columns, rows, stride, choice);
 }
 
 float lightDensity(const LanesView& light, float x, float y) {

@@ -15,11 +15,18 @@ namespace lobe {
 
 /// With G1 = constant + Σ a_i N_i and G2 = Σ b_j N_j: the masses of all pairs, a_i b_j N(μ_i − μ_j | 0, Σ_i + Σ_j) at
 /// pairs[i·stride + j] for the light's stride, and constant · b_j in the row behind the last component; the sums over i
-/// at columns[j]. Returns their sum Z = ∫ G1 G2.
+/// and over all columns up to j at columns[j]. Returns the last of these, Z = ∫ G1 G2.
 ///
 /// The sum of two covariances is made of their Cholesky factors: |S| = (d_i + d_j) S_xx + xx_i xx_j (slope_i −
 /// slope_j)² is a sum of positive terms, exact also for long thin lobes whose determinants cancel.
 float pairMasses(const LanesView& reflectance, float constant, const LanesView& light, float* pairs, float* columns);
+
+struct PairIndex {
+  int row, column;
+};
+/// A pair in proportion to its mass, with `choice` uniform in [0,1); of what pairMasses wrote, with a positive and
+/// finite sum. rows: of pairs, the constant's included.
+PairIndex choosePair(const float* pairs, const float* columns, int rows, int stride, float choice);
 
 /// Σ π_k N_k at (x, y), of a light; 0 far away.
 float lightDensity(const LanesView& light, float x, float y);

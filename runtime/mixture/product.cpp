@@ -14,24 +14,6 @@ Vec2 standardNormal(const Vec2& u) {
   return {radius * std::cos(angle), radius * std::sin(angle)};
 }
 
-/// The component whose share `left` falls in, with `left` then counted from where that share begins. Rounding may leave
-/// a little at the end: then it is the last that has a share.
-template <class Share>
-int choose(int count, float& left, const Share& share) {
-  int chosen = 0;
-  float before = left;
-  for (int k = 0; k < count; ++k) {
-    const float mass = share(k);
-    if (!(mass > 0)) continue;
-    chosen = k;
-    before = left;
-    if (left < mass) break;
-    left -= mass;
-  }
-  left = before;
-  return chosen;
-}
-
 /// One component by the numbers that a product is made of; d is the variance of y at a given x.
 struct Factor {
   float x, y, slope, xx, d;
@@ -69,10 +51,18 @@ Vec2 sampleLane(const LanesView& mixture, int k, const Vec2& u) {
 
 Vec2 sampleLanes(const LanesView& mixture, float choice, const Vec2& u) {
   const float* weights = mixture.field(LaneField::weight);
-  float left = 0;
-  for (int k = 0; k < mixture.count; ++k) left += weights[k];
-  left *= choice;
-  return sampleLane(mixture, choose(mixture.count, left, [&](int k) { return weights[k]; }), u);
+  float total = 0;
+  for (int k = 0; k < mixture.count; ++k) total += weights[k];
+  float left = choice * total;
+  // Rounding may leave a little at the end: then the last component that has weight is taken.
+  int chosen = 0;
+  for (int k = 0; k < mixture.count; ++k) {
+    if (!(weights[k] > 0)) continue;
+    chosen = k;
+    if (left < weights[k]) break;
+    left -= weights[k];
+  }
+  return sampleLane(mixture, chosen, u);
 }
 
 Product::Product(const LanesView& reflectance, float constant, const LanesView& light)
@@ -83,11 +73,9 @@ Product::Product(const LanesView& reflectance, float constant, const LanesView& 
 }
 
 Vec2 Product::sample(float choice, const Vec2& u) const {
-  float left = choice * mass_;
-  const int j = choose(light_.count, left, [&](int k) { return columns_[k]; });
-  const int i = choose(reflectance_.count + 1, left, [&](int k) { return pairs_[k * light_.stride + j]; });
-  if (i == reflectance_.count) return sampleLane(light_, j, u);
-  return samplePair(Factor(reflectance_, i), Factor(light_, j), standardNormal(u));
+  const PairIndex pair = choosePair(pairs_.data(), columns_.data(), reflectance_.count + 1, light_.stride, choice);
+  if (pair.row == reflectance_.count) return sampleLane(light_, pair.column, u);
+  return samplePair(Factor(reflectance_, pair.row), Factor(light_, pair.column), standardNormal(u));
 }
 
 float Product::pdf(const Vec2& y) const {

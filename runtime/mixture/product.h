@@ -43,7 +43,7 @@ class Product {
   LanesView reflectance_, light_;
   float constant_;
   float mass_ = 0;
-  std::array<float, kMaxLightComponents> columns_;  // masses by the light's component
+  std::array<float, kMaxLightComponents> columns_;  // running sums over the light's components
   /// Masses of all pairs, the light's components fastest; the last row is the constant's.
   std::array<float, std::size_t{kMaxReflectanceComponents + 1} * kMaxLightComponents> pairs_;
 };

@@ -10,10 +10,10 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "materials/sampling.h"
 #include "runtime/guiding/illumination_cache.h"
 #include "runtime/guiding/reflectance.h"
 #include "runtime/mixture/random.h"
-#include "materials/sampling.h"
 #include "runtime/render/all_pairs.h"
 #include "runtime/render/camera.h"
 #include "runtime/render/raytracer.h"
@@ -99,7 +99,7 @@ std::vector<Reflectance> reflectances(int components) {
   return all;
 }
 
-/// Random numbers made beforehand: they are not what is timed.
+/// Random numbers made beforehand: they are not what is timed. So many that no branch can be learnt by heart.
 struct Draw {
   float choice;
   Vec2 u;
@@ -107,7 +107,7 @@ struct Draw {
 
 std::vector<Draw> draws() {
   Rng rng(3);
-  std::vector<Draw> all(1024);
+  std::vector<Draw> all(kBatch);
   for (Draw& d : all) {
     d.choice = rng.uniform();
     d.u = rng.uniform2();
@@ -154,7 +154,7 @@ class SampleTimer {
         if (ahead)
           for (int b = 0; b < 384; b += 64) __builtin_prefetch(reinterpret_cast<const char*>(order[next_]) + b);
         const auto product = make(reflectances_[i % kHotRecords].gaussians.view(), record.lanes());
-        const Draw& d = draws_[i % draws_.size()];
+        const Draw& d = draws_[i];
         sink_ = sink_ + product.pdf(product.sample(d.choice, d.u));
       }
     });
