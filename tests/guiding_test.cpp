@@ -133,11 +133,15 @@ TEST_CASE("guiding: records come back as they were given, and few Gaussians take
     const auto bytes = static_cast<std::size_t>(a.count) * sizeof(Gaussian);
     CHECK(std::memcmp(a.components.data(), b.components.data(), bytes) == 0);
   }
+  const IlluminationCache merged = reduced(cache, 1e6f);
+  CHECK(merged.meanComponents() == Approx(8.0 / 9));  // all but the empty one keep one
+  CHECK(merged.bytes() < cache.bytes());
+  CHECK(reduced(cache, 0).meanComponents() == cache.meanComponents());
   const auto bytesOf = [](IlluminationRecord r, int count) {
     r.count = count;
     return IlluminationCache({r}, 1).bytes();
   };
-  CHECK(bytesOf(records[0], 8) - bytesOf(records[0], 4) == 160);
+  CHECK(bytesOf(records[0], 8) - bytesOf(records[0], 4) == 160);  // 384 and 224 bytes
 }
 
 TEST_CASE("guiding: the look-up works far from the origin") {

@@ -34,22 +34,24 @@ LobeCache openFor(const std::filesystem::path& folder, const LobeRequest& reques
 
 }  // namespace
 
-BrdfCaches::Entry::Entry(LobeCache opened)
+BrdfCaches::Entry::Entry(LobeCache opened, float reduction)
     : cache(std::move(opened)),
       grid{static_cast<GridKind>(cache.info().gridKind), static_cast<int>(cache.info().gridCount)} {
   for (const CacheRecord& r : cache.records()) {
     const std::span<const Gaussian> fitted = asGaussians(cache.components(r));
-    const int count = static_cast<int>(fitted.size()), stride = paddedLanes(count);
+    Mixture mixture(fitted.begin(), fitted.end());
+    if (reduction > 0) reduce(mixture, reduction);
+    const int count = static_cast<int>(mixture.size()), stride = paddedLanes(count);
     records.push_back({toDisc(grid.direction(static_cast<int>(r.entry))), lanes.size(), stride, count,
                        r.integral / std::max(1.0f - r.outside, 0.1f), r.albedo, r.cosineMass});
     lanes.resize(lanes.size() + static_cast<std::size_t>(stride) * kLaneFields);
-    packLanes(fitted, lanes.data() + records.back().first, stride);
+    packLanes(mixture, lanes.data() + records.back().first, stride);
   }
   lanes.resize(lanes.size() + kMostLanes);  // kernels read whole sets of lanes
 }
 
 BrdfCaches::BrdfCaches(const std::filesystem::path& folder, std::span<const LobeRequest> requests,
-                       const std::string& remedy) {
+                       const std::string& remedy, float reduction) {
   std::map<std::string, int> known;
   std::map<std::string, std::vector<std::string>> faults;  // by message, the materials
   for (const LobeRequest& request : requests) {
@@ -57,7 +59,7 @@ BrdfCaches::BrdfCaches(const std::filesystem::path& folder, std::span<const Lobe
     cacheOfRequest_.push_back(entry->second);
     if (!added) continue;
     try {
-      caches_.emplace_back(openFor(folder, request));
+      caches_.emplace_back(openFor(folder, request), reduction);
     } catch (const std::runtime_error& e) {
       faults[e.what()].push_back(request.material);
       known.erase(entry);  // so that the next material of the same lobe is named, too
@@ -96,6 +98,15 @@ std::size_t BrdfCaches::bytes() const {
   std::size_t sum = 0;
   for (const Entry& e : caches_) sum += e.cache.bytes();
   return sum;
+}
+
+double BrdfCaches::meanComponents() const {
+  double sum = 0, count = 0;
+  for (const Entry& e : caches_) {
+    count += static_cast<double>(e.records.size());
+    for (const Record& r : e.records) sum += r.count;
+  }
+  return count > 0 ? sum / count : 0;
 }
 
 std::vector<std::uint64_t> BrdfCaches::hashes() const {

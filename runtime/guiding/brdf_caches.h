@@ -25,7 +25,9 @@ class BrdfCaches {
  public:
   /// Opens the file of every request in the folder; equal keys share one. Throws std::runtime_error with one line that
   /// names all materials whose cache is missing, stale or damaged, and `remedy`, the command that makes them.
-  BrdfCaches(const std::filesystem::path& folder, std::span<const LobeRequest> requests, const std::string& remedy);
+  /// Mixtures are merged by `reduce` at the threshold `reduction` of cost; 0 leaves them.
+  BrdfCaches(const std::filesystem::path& folder, std::span<const LobeRequest> requests, const std::string& remedy,
+             float reduction = 0);
 
   /// Adds tint · ρ_lobe at wo to a reflectance. lobe: index of the request. wo: unit, z > 0, in the shading frame.
   /// turn: (cos, sin) of the angle by which the reflectance's frame sees shading-frame vectors turned about the normal.
@@ -34,6 +36,7 @@ class BrdfCaches {
 
   std::size_t files() const { return caches_.size(); }
   std::size_t bytes() const;
+  double meanComponents() const;  ///< of a record; 0 without records
   /// Content hashes of the files, in order of first use.
   std::vector<std::uint64_t> hashes() const;
 
@@ -50,7 +53,7 @@ class BrdfCaches {
     LanesView view(const std::vector<float>& lanes) const { return {lanes.data() + first, stride, count}; }
   };
   struct Entry {
-    Entry(LobeCache opened);
+    Entry(LobeCache opened, float reduction);
     LobeCache cache;
     DirectionGrid grid;
     std::vector<Record> records;

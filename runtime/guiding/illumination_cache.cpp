@@ -71,7 +71,9 @@ void IlluminationCache::pack(const IlluminationRecord& record) {
   const std::size_t first = blocks_.size();
   const auto index = static_cast<std::uint32_t>(places_.size());
   places_.push_back({record.position, record.normal, record.radius, static_cast<std::uint32_t>(first)});
-  blocks_.resize(first + 1 + static_cast<std::size_t>(stride) * kLaneFields / std::size(Block{}.floats));
+  constexpr std::size_t kBlockFloats = sizeof(Block) / sizeof(float);
+  const std::size_t floats = static_cast<std::size_t>(stride) * kLaneFields;
+  blocks_.resize(first + 1 + (floats + kBlockFloats - 1) / kBlockFloats);
   new (&blocks_[first]) PackedRecord{.tangent = record.tangent,
                                      .background = record.background,
                                      .irradiance = record.irradiance,
@@ -102,6 +104,23 @@ std::vector<IlluminationRecord> IlluminationCache::records() const {
   all.reserve(places_.size());
   for (const Place& place : places_) all.push_back(unpacked(at(place.block)));
   return all;
+}
+
+double IlluminationCache::meanComponents() const {
+  double sum = 0;
+  for (const Place& place : places_) sum += at(place.block).count;
+  return places_.empty() ? 0 : sum / static_cast<double>(places_.size());
+}
+
+IlluminationCache reduced(const IlluminationCache& cache, float threshold) {
+  std::vector<IlluminationRecord> records = cache.records();
+  for (IlluminationRecord& r : records) {
+    Mixture mixture(r.gaussians().begin(), r.gaussians().end());
+    reduce(mixture, threshold);
+    r.count = static_cast<std::int32_t>(mixture.size());
+    std::ranges::copy(mixture, r.components.begin());
+  }
+  return {records, cache.unit()};
 }
 
 std::uint64_t IlluminationCache::cellKey(const Eigen::Vector3i& cell) const {

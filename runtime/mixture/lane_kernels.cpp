@@ -1,6 +1,5 @@
 #include "runtime/mixture/lane_kernels.h"
 
-#include <array>
 #include <cstddef>
 #include <numbers>
 
@@ -18,28 +17,15 @@ namespace lobe::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// The variance of y at a given x.
-template <class D>
-HWY_INLINE hn::Vec<D> conditionalVariance(D d, hn::Vec<D> across) {
-  return hn::Mul(hn::Set(d, kHalfLog2e), reciprocal(d, hn::Neg(across)));
-}
-
-// The same for all components of a reflectance.
-template <class D>
-HWY_INLINE void conditionalVariances(D d, LanesView mixture, float* out) {
-  for (int k = 0; k < mixture.count; k += static_cast<int>(hn::Lanes(d)))
-    hn::StoreU(conditionalVariance(d, hn::LoadU(d, mixture.field(LaneField::across) + k)), d, out + k);
-}
-
 // The columns of one set of lanes of the light.
 template <class D>
-HWY_INLINE hn::Vec<D> pairColumns(D d, LanesView reflectance, const float* variances, float constant, LanesView light,
-                                  int first, float* pairs) {
+HWY_INLINE hn::Vec<D> pairColumns(D d, LanesView reflectance, float constant, LanesView light, int first,
+                                  float* pairs) {
   const auto two = [&](LaneField f) { return hn::LoadU(d, light.field(f) + first); };
   const auto x2 = two(LaneField::x), y2 = two(LaneField::y), slope2 = two(LaneField::slope), xx2 = two(LaneField::xx),
              xy2 = two(LaneField::xy), weight2 = two(LaneField::weight);
   const auto scale2 = hn::Mul(weight2, hn::Set(d, 0.5f * std::numbers::inv_pi_v<float>));
-  const auto variance2 = conditionalVariance(d, two(LaneField::across));
+  const auto variance2 = two(LaneField::conditional);
   auto sum = hn::Mul(hn::Set(d, constant), weight2);
   hn::StoreU(sum, d, pairs + reflectance.count * light.stride + first);
   for (int i = 0; i < reflectance.count; ++i) {
@@ -47,8 +33,8 @@ HWY_INLINE hn::Vec<D> pairColumns(D d, LanesView reflectance, const float* varia
     const auto xx1 = one(LaneField::xx);
     const auto sxx = hn::Add(xx1, xx2), sxy = hn::Add(one(LaneField::xy), xy2);
     const auto bend = hn::Sub(one(LaneField::slope), slope2);
-    const auto determinant =
-        hn::MulAdd(hn::Add(hn::Set(d, variances[i]), variance2), sxx, hn::Mul(hn::Mul(xx1, xx2), hn::Mul(bend, bend)));
+    const auto determinant = hn::MulAdd(hn::Add(one(LaneField::conditional), variance2), sxx,
+                                        hn::Mul(hn::Mul(xx1, xx2), hn::Mul(bend, bend)));
     const auto dx = hn::Sub(one(LaneField::x), x2), dy = hn::Sub(one(LaneField::y), y2);
     const auto across = hn::NegMulAdd(sxy, dx, hn::Mul(dy, sxx));  // (dy − slope dx) S_xx
     const auto height = reciprocalRoot(d, determinant);            // 1/sqrt|S|
@@ -80,10 +66,8 @@ HWY_INLINE float sumUp(float* values, int count) {
 template <class D>
 HWY_INLINE float pairMassesBy(D d, LanesView reflectance, float constant, LanesView light, float* pairs,
                               float* columns) {
-  HWY_ALIGN std::array<float, kMaxReflectanceComponents + kMostLanes> variances;
-  conditionalVariances(d, reflectance, variances.data());
   for (int j = 0; j < light.stride; j += static_cast<int>(hn::Lanes(d)))
-    hn::StoreU(pairColumns(d, reflectance, variances.data(), constant, light, j, pairs), d, columns + j);
+    hn::StoreU(pairColumns(d, reflectance, constant, light, j, pairs), d, columns + j);
   return sumUp(columns, light.stride);
 }
 
@@ -200,8 +184,7 @@ HWY_INLINE void placeBy(D d, LanesView mixture, const Placement& p, float* out, 
     // Σ = xx (1, slope)(1, slope)ᵀ + d (0, 1)(0, 1)ᵀ: both vectors are turned, and |Σ| stays.
     const auto slope = hn::Mul(hn::Set(d, p.mirrorX * p.mirrorY), from(LaneField::slope));
     const auto ux = hn::NegMulAdd(sine, slope, cosine), uy = hn::MulAdd(cosine, slope, sine);
-    const auto across = from(LaneField::across), along = from(LaneField::along), wide = from(LaneField::xx);
-    const auto narrow = hn::Div(half, across);
+    const auto wide = from(LaneField::xx), narrow = from(LaneField::conditional);
     const auto xx = hn::MulAdd(hn::Mul(wide, ux), ux, hn::Mul(hn::Mul(narrow, sine), sine));
     const auto xy = hn::NegMulAdd(hn::Mul(narrow, sine), cosine, hn::Mul(hn::Mul(wide, ux), uy));
     const auto yy = hn::MulAdd(hn::Mul(wide, uy), uy, hn::Mul(hn::Mul(narrow, cosine), cosine));
@@ -211,7 +194,9 @@ HWY_INLINE void placeBy(D d, LanesView mixture, const Placement& p, float* out, 
     to(LaneField::yy, yy);
     to(LaneField::slope, hn::Mul(xy, inverse));
     to(LaneField::along, hn::Mul(half, inverse));
-    to(LaneField::across, hn::Mul(hn::Mul(xx, hn::Set(d, -1.0f / kHalfLog2e)), hn::Mul(along, across)));
+    const auto determinant = hn::Mul(wide, narrow);
+    to(LaneField::conditional, hn::Mul(determinant, inverse));
+    to(LaneField::across, hn::Div(hn::Mul(half, xx), determinant));
     to(LaneField::scale, hn::Mul(factor, from(LaneField::scale)));
     to(LaneField::weight, hn::Mul(factor, from(LaneField::weight)));
   }

@@ -18,6 +18,7 @@ void packLane(const Gaussian& g, float* data, int stride, int k) {
   put(LaneField::across, -kHalfLog2e * xx / determinant);
   put(LaneField::scale, g.weight * 0.5 * std::numbers::inv_pi / std::sqrt(determinant));
   put(LaneField::xx, xx);
+  put(LaneField::conditional, determinant / xx);
   put(LaneField::xy, xy);
   put(LaneField::yy, yy);
   put(LaneField::weight, g.weight);

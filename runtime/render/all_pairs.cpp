@@ -25,7 +25,7 @@ HWY_INLINE hn::Vec<D> formRow(D d, const LanesView& reflectance, int i, const La
   const auto half = hn::Set(d, -kHalfLog2e);
   const auto xx1 = one(LaneField::xx), xx2 = two(LaneField::xx);
   const auto slope1 = one(LaneField::slope), slope2 = two(LaneField::slope);
-  const auto d1 = hn::Div(half, one(LaneField::across)), d2 = hn::Div(half, two(LaneField::across));
+  const auto d1 = one(LaneField::conditional), d2 = two(LaneField::conditional);
   const auto sxx = hn::Add(xx1, xx2), across = hn::Add(d1, d2), wide = hn::Mul(xx1, xx2);
   const auto bend = hn::Sub(slope1, slope2);
   const auto determinant = hn::MulAdd(sxx, across, hn::Mul(wide, hn::Mul(bend, bend)));
@@ -51,6 +51,7 @@ HWY_INLINE hn::Vec<D> formRow(D d, const LanesView& reflectance, int i, const La
   to(LaneField::across, hn::Div(half, dd));
   to(LaneField::scale, hn::Mul(weight, hn::Div(hn::Set(d, 0.15915494f), hn::Sqrt(hn::Mul(xx, dd)))));
   to(LaneField::xx, xx);
+  to(LaneField::conditional, dd);
   to(LaneField::weight, weight);
   return weight;
 }

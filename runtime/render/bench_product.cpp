@@ -271,7 +271,7 @@ void run(const Options& o) {
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
   for (const int two : {4, 8}) {
     const LightSets lights(two);
-    for (const int one : {1, 2, 3, 5, 8, 4}) rows.push_back(row(one, two, lights, rays, o));
+    for (const int one : {1, 2, 3, 4, 5, 8}) rows.push_back(row(one, two, lights, rays, o));
   }
   const std::string used = o.target.empty() ? kernelTargetName(kernelTargets().front()) : o.target;
   fmt::print("{}\n", nlohmann::ordered_json{{"target", used}, {"rows", rows}}.dump(2));

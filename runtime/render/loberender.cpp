@@ -71,6 +71,9 @@ void declare(CLI::App& app, Options& options) {
   app.add_option("--seconds", job.seconds, "Seconds of training and rendering, instead of --spp");
   app.add_option("--size", options.size, "WIDTHxHEIGHT in pixels, instead of the scene's");
   app.add_option("--max-depth", job.maxDepth, "Longest path in segments (default: no limit)");
+  app.add_option("--reduction", job.reduction,
+                 "Merge Gaussians of lobes and records up to this cost (Runnalls; 0: none, the paper: 0.2)")
+      ->capture_default_str();
   app.add_option("--termination", job.termination,
                  "How paths end: plain, by what they carry, or window, by what is expected of them (guided, product)")
       ->transform(CLI::CheckedTransformer(

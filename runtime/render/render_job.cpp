@@ -131,6 +131,12 @@ struct Guiding {
   std::optional<GuidedSampler> sampler;
 
   const BrdfCaches* cachesOrNull() const { return caches ? &*caches : nullptr; }
+  std::size_t unreducedBytes = 0;  ///< of the records
+
+  void reduceRecords(float threshold) {
+    unreducedBytes = training.cache.bytes();
+    if (threshold > 0) training.cache = reduced(training.cache, threshold);
+  }
 };
 
 /// What a run leaves besides the picture.
@@ -202,7 +208,10 @@ nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, c
           {"training_particles", run.training().particles()},
           {"records", run.guiding.training.cache.size()},
           {"records_undersampled_share", run.training().undersampledShare},
+          {"record_bytes_before_reduction", run.guiding.unreducedBytes},
           {"record_bytes", run.guiding.training.cache.bytes()},
+          {"record_components", run.guiding.training.cache.meanComponents()},
+          {"lobe_components", run.guiding.caches ? run.guiding.caches->meanComponents() : 0.0},
           {"lobe_bytes", run.guiding.caches ? run.guiding.caches->bytes() : 0},
           {"strategy_shares", sharesOf(paths.strategies, kSamplingStrategyNames)},
           {"guiding_decisions", sharesOf(paths.decisions, kGuidingDecisionNames)},
@@ -307,6 +316,7 @@ void RenderJob::validate() const {
   require(!trainSeconds || !seconds || *trainSeconds < *seconds, "--train-seconds has to be less than --seconds");
   require(!passes || *passes >= 1, "--passes has to be at least 1");
   require(reference.empty() == convergence.empty(), "--reference and --convergence go together");
+  require(reduction >= 0 && std::isfinite(reduction), "--reduction has to be at least 0");
   require(!outputs.empty(), "-o is missing");
   require(!record || integrator != IntegratorKind::path, "--record is for guided and product: path learns nothing");
   require(recordImage.extension() == ".png", "--record-image is written as .png");
@@ -342,7 +352,7 @@ void run(const RenderJob& job) {
     load.restoring = restoring.seconds();
   }
   if (job.integrator == IntegratorKind::product)
-    guiding.caches.emplace(job.cacheFolder, lobeRequests(scene), lobefitCommand(job));
+    guiding.caches.emplace(job.cacheFolder, lobeRequests(scene), lobefitCommand(job), job.reduction);
   const Stopwatch building;
   const RenderScene renderScene(scene);
   load.building = building.seconds();
@@ -353,6 +363,7 @@ void run(const RenderJob& job) {
     receiver = forRecord(job, [&] { return receiverAt(renderScene, camera, job.record->first, job.record->second); });
   if (job.integrator != IntegratorKind::path) {
     if (!stored) train(job, renderScene, camera, guiding);
+    guiding.reduceRecords(job.reduction);
     guiding.sampler.emplace(scene, guiding.training.cache, guiding.cachesOrNull());
   }
   if (receiver) drawRecord(job, renderScene, *receiver, guiding.training);

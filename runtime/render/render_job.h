@@ -31,6 +31,7 @@ struct RenderJob {
   std::optional<int> maxDepth;  ///< segments
   Termination termination = Termination::window;
   std::uint64_t seed = 1;
+  float reduction = 0;  ///< threshold of cost up to which the mixtures of both factors are merged; 0: not at all
   TrainingPlan training;
   std::optional<int> passes;           ///< of training; by default the plan's, or without limit where time is one
   std::optional<double> trainSeconds;  ///< no pass starts after that; by default a share of seconds, else no limit
