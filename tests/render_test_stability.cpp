@@ -155,6 +155,17 @@ TEST_CASE("stability: too few particles to learn from") {
   });
 }
 
+TEST_CASE("stability: hardly any time to train") {
+  const std::size_t full = Trial(roomScene(), smallPlan(TrainFrom::both)).trained.report.passes.front().particles;
+  checkUnbiased(roomScene(), 64, [](TrainingPlan& plan) { plan.seconds = 1e-9; });
+  TrainingPlan plan = smallPlan(TrainFrom::both);
+  plan.seconds = 1e-9;
+  const Trial hurried(roomScene(), plan);
+  REQUIRE(hurried.trained.report.passes.size() == 1);
+  CHECK(hurried.trained.report.passes.front().particles < full / 8);
+  CHECK(hurried.cache().size() > 0);
+}
+
 TEST_CASE("stability: where no photon arrives there is no record") {
   Scene scene;
   addShape(scene, rectangle({-2, 0, -2}, {0, 0, 4}, {4, 0, 0}), addDiffuse(scene, 0.6f));

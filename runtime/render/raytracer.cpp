@@ -1,7 +1,6 @@
 #include "runtime/render/raytracer.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
@@ -10,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "runtime/render/shape_geometry.h"
+#include "runtime/render/stopwatch.h"
 
 namespace lobe {
 namespace {
@@ -155,9 +155,9 @@ struct RayTracer::Embree {
       box.extend(shapeBox);
       add(result, shapes[i], static_cast<unsigned>(i));
     }
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     rtcCommitScene(result);
-    buildSeconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    buildSeconds += watch.seconds();
     if (!error.empty()) throw std::runtime_error(fmt::format("Embree: {}", error));
     return result;
   }

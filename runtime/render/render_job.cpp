@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -24,6 +23,7 @@
 #include "runtime/render/path_integrator.h"
 #include "runtime/render/record_view.h"
 #include "runtime/render/renderer.h"
+#include "runtime/render/stopwatch.h"
 #include "runtime/render/stored_illumination.h"
 #include "scenes/camera.h"
 #include "scenes/reader.h"
@@ -155,15 +155,6 @@ struct LoadTimes {
   double building = 0;   ///< acceleration structure and light tables
   double embree = 0;     ///< Embree's share of it
   double restoring = 0;  ///< illumination from its file
-};
-
-class Stopwatch {
- public:
-  double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  Clock::time_point start_ = Clock::now();
 };
 
 nlohmann::ordered_json asJson(const PassReport& pass) {

@@ -1,7 +1,6 @@
 #include "runtime/render/renderer.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <stdexcept>
 #include <vector>
@@ -9,6 +8,8 @@
 #include <fmt/format.h>
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
+
+#include "runtime/render/stopwatch.h"
 
 namespace lobe {
 namespace {
@@ -107,17 +108,16 @@ void RenderOptions::validate() const {
 
 RenderResult render(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options,
                     const AfterWave& afterWave) {
-  using Clock = std::chrono::steady_clock;
   options.validate();
   const WaveRenderer renderer(camera, integrator, film, options.seed);
   const WavePlan plan(options);
   RenderResult result{{}, {0.0, 0}};
   RenderProgress& progress = result.total;
   while (const int samples = plan.next(progress)) {
-    const Clock::time_point start = Clock::now();
+    const Stopwatch watch;
     const int first = options.firstSample + progress.samples;
     result.statistics += renderer.render({first, first + samples});
-    progress.seconds += std::chrono::duration<double>(Clock::now() - start).count();
+    progress.seconds += watch.seconds();
     progress.samples += samples;
     if (afterWave) afterWave(progress);
   }

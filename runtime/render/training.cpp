@@ -2,22 +2,15 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
+#include <cmath>
 #include <stdexcept>
 
 #include <oneapi/tbb/parallel_invoke.h>
 
+#include "runtime/render/stopwatch.h"
+
 namespace lobe {
 namespace {
-
-class Stopwatch {
- public:
-  double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  Clock::time_point start_ = Clock::now();
-};
 
 /// Importance only steers photons: half the components and neighbours do (measured by lobebench-illumination).
 TrainingOptions importanceOptions(TrainingOptions options) {
@@ -25,6 +18,37 @@ TrainingOptions importanceOptions(TrainingOptions options) {
   options.neighbours = std::max(1, options.neighbours / 2);
   return options;
 }
+
+/// How much of the plan's particles each pass traces. All, where time is not limited. Where it is, passes begin small
+/// and double: so even short training is of several passes, and none begins that would end much too late.
+class PassSizes {
+ public:
+  explicit PassSizes(const TrainingPlan& plan) : limit_(plan.seconds), next_(limit_ < kInfinity ? kFirst : 1) {}
+
+  /// Of the next pass, in (0, 1]; nullopt: it would not end in time. The first pass always is.
+  std::optional<double> next() const {
+    if (taken_ == 0 || limit_ == kInfinity) return next_;
+    const double left = limit_ - watch_.seconds();
+    const double fitting = std::min(next_, last_ * left / taken_);
+    // A pass that brings less than the one before takes its time from rendering for little.
+    return fitting >= std::min(last_, next_) ? std::optional(fitting) : std::nullopt;
+  }
+
+  double last() const { return last_; }
+
+  void passDone(double size, double seconds) {
+    last_ = size;
+    taken_ = seconds;
+    next_ = std::min(1.0, 2 * size);
+  }
+
+ private:
+  static constexpr double kFirst = 1.0 / 16;
+
+  double limit_, next_;
+  double last_ = 0, taken_ = 0;  // size and seconds of the last pass
+  Stopwatch watch_;
+};
 
 /// One training run. Importons are guided by the light learnt in the passes before, photons by the importance that
 /// importons have brought.
@@ -45,16 +69,17 @@ class Training {
   Training(const Training&) = delete;
   Training& operator=(const Training&) = delete;
 
-  PassReport runPass(int pass) {
+  /// size: see PassSizes.
+  PassReport runPass(int pass, double size) {
     const Stopwatch watch;
-    ImportonResult importons = tracer_->traceImportons(pass, plan_.importons, wishes_);
+    ImportonResult importons = tracer_->traceImportons(pass, shareOf(plan_.importons, size), wishes_);
     if (guide_) {
       for (const EnvironmentUse& use : importons.uses) guide_->learn(use.point, use.wi, use.weight);
       guide_->update();
     }
     samples_ = std::move(importons.samples);
     PhotonResult photons;
-    if (wishes_.importance) photons = tracer_->tracePhotons(pass, plan_.photons);
+    if (wishes_.importance) photons = tracer_->tracePhotons(pass, shareOf(plan_.photons, size));
     photons_ = std::move(photons.particles);
     PassReport report{0, photons_.size() + samples_.size(), 0, std::nullopt};
     // Side by side: what one has to do in order leaves room for the other.
@@ -67,12 +92,15 @@ class Training {
   }
 
   /// Radii have shrunk since the last requests were made: a last look closes the gaps.
-  void finish(int passes) { radiance_.fill(sources(), tracer_->traceImportons(passes, plan_.importons, {}).requests); }
+  void finish(int passes, double size) {
+    radiance_.fill(sources(), tracer_->traceImportons(passes, shareOf(plan_.importons, size), {}).requests);
+  }
 
   const IlluminationTrainer& radiance() const { return radiance_; }
   std::array<std::vector<Particle>, 2> takeParticles() { return {std::move(photons_), std::move(samples_)}; }
 
  private:
+  static int shareOf(int count, double size) { return std::max(1, static_cast<int>(std::lround(size * count))); }
   std::array<std::span<const Particle>, 2> sources() const { return {photons_, samples_}; }
 
   const TrainingPlan& plan_;
@@ -108,19 +136,22 @@ std::uint64_t TrainingReport::particles() const {
 }
 
 TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera& camera, const BrdfCaches* caches,
-                                      const TrainingPlan& plan, const std::function<void(const PassReport&)>& afterPass) {
+                                      const TrainingPlan& plan,
+                                      const std::function<void(const PassReport&)>& afterPass) {
   plan.validate();
   if (scene.tracer.bounds().isEmpty() || scene.lights.empty()) return {};
   const Stopwatch watch;
   Training training(scene, camera, caches, plan);
   TrainingReport report;
-  int passes = 0;
-  while (passes < plan.passes && (passes == 0 || watch.seconds() < plan.seconds)) {
-    report.passes.push_back(training.runPass(passes));
-    ++passes;
+  PassSizes sizes(plan);
+  for (int pass = 0; pass < plan.passes; ++pass) {
+    const std::optional<double> size = sizes.next();
+    if (!size) break;
+    report.passes.push_back(training.runPass(pass, *size));
+    sizes.passDone(*size, report.passes.back().seconds);
     if (afterPass) afterPass(report.passes.back());
   }
-  training.finish(passes);
+  training.finish(static_cast<int>(report.passes.size()), sizes.last());
   report.seconds = watch.seconds();
   report.undersampledShare = training.radiance().undersampledShare();
   TrainedIllumination trained{training.radiance().cache(), report, {}};

@@ -22,7 +22,8 @@ struct TrainingPlan {
   int passes = 8;
   int photons = 300000;        ///< a pass; none are traced for TrainFrom::paths
   int importons = 100000;      ///< a pass
-  double seconds = kInfinity;  ///< no pass starts after that; the result then depends on the machine's speed
+  /// Passes end by then, as far as can be foreseen: they begin small and double. Results depend on the machine's speed.
+  double seconds = kInfinity;
   std::uint64_t seed = 1;
   bool keepParticles = false;  ///< of the last pass, for TrainedIllumination::particles
   TrainingOptions records;
