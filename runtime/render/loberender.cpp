@@ -45,7 +45,7 @@ void declareTraining(CLI::App& app, RenderJob& job) {
   app.add_option("--components", plan.records.components, "Gaussians of an illumination record, 1 to 8")
       ->capture_default_str();
   app.add_option("--train-seconds", job.trainSeconds,
-                 "No training pass starts after that (default: 0.15 of --seconds; with --spp no limit)");
+                 "Training ends by then, as far as can be foreseen (default: 0.15 of --seconds; with --spp no limit)");
   app.add_option("--save-illumination", job.saveIllumination, "Keep what was trained in this file (.illum)");
   auto* stored = app.add_option("--illumination", job.illumination,
                                 "Use what an earlier run kept of the same scene, from whatever camera; do not train");
