@@ -27,6 +27,7 @@ constexpr std::uint64_t kHeldOutSeed = 1000003;
 struct Options {
   std::string scene;
   ReadOptions read;
+  std::vector<TrainFrom> sources{TrainFrom::both};
   std::vector<int> passes{1, 2, 4, 8, 16};
   int width = 350;
   int receivers = 200;
@@ -35,8 +36,9 @@ struct Options {
   TrainingPlan plan;
 };
 
-/// A training and how long it was.
+/// A training, from what and how long it was.
 struct Trained {
+  TrainFrom from;
   int passes;
   TrainedIllumination illumination;
 };
@@ -134,8 +136,13 @@ nlohmann::ordered_json grade(const Exam& exam, const IlluminationCache& cache) {
           {"share_with_particles", withParticles / count}};
 }
 
+std::string nameOf(TrainFrom from) {
+  const auto names = trainFromNames();
+  return std::ranges::find(names, from, [](const auto& name) { return name.second; })->first;
+}
+
 nlohmann::ordered_json row(const Exam& exam, const Trained& trained) {
-  nlohmann::ordered_json json{{"passes", trained.passes}};
+  nlohmann::ordered_json json{{"train", nameOf(trained.from)}, {"passes", trained.passes}};
   json.update(grade(exam, trained.illumination.cache));
   json["seconds"] = trained.illumination.report.seconds;
   json["particles"] = trained.illumination.report.particles();
@@ -153,18 +160,21 @@ void run(Options& o) {
   const Scene scene = readFor(o);
   const RenderScene renderScene(scene);
   const RayCamera camera(scene.camera, scene.filter);
-  Progress progress("training", static_cast<double>(o.passes.size() + 1));
+  Progress progress("training", static_cast<double>(o.sources.size() * o.passes.size() + 1));
   std::vector<Trained> trainings;
-  for (const int passes : o.passes) {
-    // Each from the start: so every row is what a render with that many passes gets.
-    o.plan.passes = passes;
-    trainings.push_back({passes, trainIllumination(renderScene, camera, nullptr, o.plan)});
-    progress.advance();
+  for (const TrainFrom from : o.sources) {
+    o.plan.from = from;
+    trainings.push_back({from, 0, {}});  // nothing learnt: the cosine
+    for (const int passes : o.passes) {
+      // Each from the start: so every row is what a render with that many passes gets.
+      o.plan.passes = passes;
+      trainings.push_back({from, passes, trainIllumination(renderScene, camera, nullptr, o.plan)});
+      progress.advance();
+    }
   }
   const Exam exam = makeExam(renderScene, camera, o, trainings.back().illumination.cache);
   progress.advance();
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-  rows.push_back(row(exam, {0, {}}));  // nothing learnt: the cosine
   for (const Trained& trained : trainings) rows.push_back(row(exam, trained));
   fmt::print("{}\n", rows.dump(2));
 }
@@ -179,7 +189,8 @@ void declare(CLI::App& app, Options& o) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   app.add_option("--receivers", o.receivers, "Places where to look")->check(CLI::PositiveNumber)->capture_default_str();
-  app.add_option("--train", o.plan.from, "What records learn from")
+  app.add_option("--train", o.sources, "What records learn from: photons, paths, both, or several, separated by commas")
+      ->delimiter(',')
       ->transform(CLI::CheckedTransformer(trainFromNames()))
       ->default_str("both");
   app.add_option("--photons", o.plan.photons, "Photons a pass")->capture_default_str();
