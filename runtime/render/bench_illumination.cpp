@@ -11,11 +11,8 @@
 #include <oneapi/tbb/parallel_for.h>
 #include <nlohmann/json.hpp>
 
+#include "runtime/render/bench_training.h"
 #include "runtime/render/received_light.h"
-#include "runtime/render/training.h"
-#include "scenes/camera.h"
-#include "scenes/reader.h"
-#include "scenes/tool.h"
 
 namespace {
 
@@ -24,16 +21,11 @@ using namespace lobe;
 // Of photons, receivers and the light they receive; not of training.
 constexpr std::uint64_t kHeldOutSeed = 1000003;
 
-struct Options {
-  std::string scene;
-  ReadOptions read;
+struct Options : BenchTraining {
   std::vector<TrainFrom> sources{TrainFrom::both};
   std::vector<int> passes{1, 2, 4, 8, 16};
-  int width = 350;
   int receivers = 200;
   int heldOutPhotons = 2000000;
-  int threads = 0;
-  TrainingPlan plan;
 };
 
 /// A training, from what and how long it was.
@@ -49,16 +41,6 @@ struct Exam {
   std::vector<std::vector<Particle>> particles;  ///< held out, around each receiver
   std::vector<ReceivedLight> light;              ///< at each receiver
 };
-
-Scene readFor(const Options& o) {
-  Scene scene = readScene(o.scene, o.read);
-  const double aspect = static_cast<double>(scene.camera.height) / scene.camera.width;
-  scene.camera.crop.reset();
-  scene.camera.width = o.width;
-  scene.camera.height = std::max(1, static_cast<int>(std::lround(o.width * aspect)));
-  scene.camera.horizontalFov = horizontalFov(scene.camera, scene.camera.width, scene.camera.height);
-  return scene;
-}
 
 /// Photons of another seed, of the environment where importons ask for them, but guided by nothing that was learnt.
 std::vector<Particle> heldOutParticles(const RenderScene& scene, const RayCamera& camera, const Options& o) {
@@ -105,10 +87,7 @@ nlohmann::ordered_json summary(std::vector<double> nevs) {
   double logs = 0;
   for (const double nev : nevs) logs += std::log(std::max(1 + nev, 1e-3));
   const auto count = static_cast<double>(nevs.size());
-  const auto quantile = [&](double share) {
-    return nevs[std::min(nevs.size() - 1, static_cast<std::size_t>(share * count))];
-  };
-  return {{"median", quantile(0.5)}, {"p90", quantile(0.9)}, {"mean", std::exp(logs / count) - 1}};
+  return {{"median", quantile(nevs, 0.5)}, {"p90", quantile(nevs, 0.9)}, {"mean", std::exp(logs / count) - 1}};
 }
 
 nlohmann::ordered_json grade(const Exam& exam, const IlluminationCache& cache) {
@@ -157,7 +136,7 @@ void run(Options& o) {
   std::ranges::sort(o.passes);
   o.plan.passes = o.passes.front();
   o.plan.validate();
-  const Scene scene = readFor(o);
+  const Scene scene = o.readScene();
   const RenderScene renderScene(scene);
   const RayCamera camera(scene.camera, scene.filter);
   Progress progress("training", static_cast<double>(o.sources.size() * o.passes.size() + 1));
@@ -180,12 +159,9 @@ void run(Options& o) {
 }
 
 void declare(CLI::App& app, Options& o) {
-  app.add_option("scene", o.scene, "Mitsuba scene file (XML)")->required();
+  o.declare(app);
   app.add_option("--passes", o.passes, "Numbers of passes to grade, separated by commas")
       ->delimiter(',')
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("--width", o.width, "Of the picture, in pixels; its shape stays")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   app.add_option("--receivers", o.receivers, "Places where to look")->check(CLI::PositiveNumber)->capture_default_str();
@@ -193,13 +169,6 @@ void declare(CLI::App& app, Options& o) {
       ->delimiter(',')
       ->transform(CLI::CheckedTransformer(trainFromNames()))
       ->default_str("both");
-  app.add_option("--photons", o.plan.photons, "Photons a pass")->capture_default_str();
-  app.add_option("--importons", o.plan.importons, "Importons a pass")->capture_default_str();
-  app.add_option("--components", o.plan.records.components, "Gaussians of a record")->capture_default_str();
-  app.add_option("--seed", o.plan.seed, "Of the training")->capture_default_str();
-  app.add_flag("--lenient", o.read.lenient, "Pass over what the reader does not know");
-  addDefinitions(app, o.read.definitions);
-  addThreads(app, o.threads);
 }
 
 }  // namespace

@@ -29,6 +29,9 @@ class GuidedSampler {
     std::optional<float> reflectedRadiance() const;
     /// Whether there is a record for this point.
     bool guided() const { return density_.has_value(); }
+    GuidingDecision decision() const { return decision_; }
+    /// The part of the density that is the BSDF's own: pdf(wi) − bsdfShare() · pdf of the BSDF is the mixtures'.
+    float bsdfShare() const { return density_ ? density_->bsdfShare() : 1.0f; }
 
    private:
     void collectReflectance(const GuidedSampler& sampler, const SurfaceHit& hit, const LobeMixture& mixture,

@@ -35,7 +35,14 @@ float directShare(float cosine, float emitterPdf) {
   return misWeight(std::max(cosine * kInvPi, 1e-6f), emitterPdf);
 }
 
-/// What of a ray's radiance emitter sampling at the receiver takes care of.
+/// Without a reflectance the guided part of the density is the illumination's alone.
+GuidedDensity guidedDensity(const PackedRecord& record) {
+  static const Reflectance none{};
+  return {none, record, kGuidedShares};
+}
+
+}  // namespace
+
 Rgb coveredEmission(const RenderScene& scene, const Receiver& receiver, const Ray& ray) {
   const float cosine = receiver.cosine(ray.direction);
   const std::optional<SurfaceHit> hit = scene.tracer.trace(ray);
@@ -45,14 +52,6 @@ Rgb coveredEmission(const RenderScene& scene, const Receiver& receiver, const Ra
   if (!hit->emitter) return Rgb::Zero();
   return emittedRadiance(*hit) * (1 - directShare(cosine, scene.lights.pdf(receiver.point.position, *hit)));
 }
-
-/// Without a reflectance the guided part of the density is the illumination's alone.
-GuidedDensity guidedDensity(const PackedRecord& record) {
-  static const Reflectance none{};
-  return {none, record, kGuidedShares};
-}
-
-}  // namespace
 
 std::vector<Receiver> receiversOfPaths(const RenderScene& scene, const RayCamera& camera, int count,
                                        std::uint64_t seed) {

@@ -35,6 +35,10 @@ struct Receiver {
 std::vector<Receiver> receiversOfPaths(const RenderScene& scene, const RayCamera& camera, int count,
                                        std::uint64_t seed);
 
+/// What of the radiance along a ray, which starts at the receiver, is emitter sampling's: (1 − w) of light straight
+/// from an emitter.
+Rgb coveredEmission(const RenderScene& scene, const Receiver& receiver, const Ray& ray);
+
 /// Where a ray first meets a surface that is not only delta, on the side it comes from. At delta surfaces it goes where
 /// most of the light does. nullopt: it leaves the scene, is absorbed, or gets lost between mirrors.
 std::optional<Receiver> firstReceiver(const RenderScene& scene, Ray ray);

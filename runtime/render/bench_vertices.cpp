@@ -1,0 +1,355 @@
+// lobebench-vertices: how well the densities that paths choose directions by fit what they are to integrate, at random
+// vertices of the camera's paths: the variance of one sample of ∫ f |cosθ| L dω, f the BSDF, by each density.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <deque>
+#include <functional>
+#include <numbers>
+#include <optional>
+#include <vector>
+
+#include <fmt/format.h>
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <nlohmann/json.hpp>
+
+#include "materials/sampling.h"
+#include "runtime/render/bench_training.h"
+#include "runtime/render/received_light.h"
+
+namespace {
+
+using namespace lobe;
+
+// Of vertices and the light they receive; not of training.
+constexpr std::uint64_t kVertexSeed = 1000003;
+constexpr int kPathsPerVertex = 100;  // until it is given up to find more
+
+struct Options : BenchTraining {
+  std::string cacheFolder = "lobes";
+  int vertices = 1000;
+  int directions = 1280;  ///< at each
+  int paths = 4;          ///< along each direction, twice
+  std::vector<double> reductions{0.02f, 0.05f, 0.1f, 0.2f, 0.5f, 1, 2};
+};
+
+/// Samples as the sampler within does, and notes where.
+struct NotingSampler {
+  const GuidedSampler& within;
+  std::vector<SurfaceHit>& vertices;
+
+  class Vertex : public GuidedSampler::Vertex {
+   public:
+    Vertex(const NotingSampler& sampler, const SurfaceHit& hit) : GuidedSampler::Vertex(sampler.within, hit) {
+      sampler.vertices.push_back(hit);
+    }
+  };
+};
+
+/// One vertex, any of them alike, from each of as many paths of the camera as it takes.
+std::vector<SurfaceHit> verticesOfPaths(const RenderScene& scene, const RayCamera& camera, const GuidedSampler& sampler,
+                                        int count) {
+  std::vector<SurfaceHit> chosen;
+  PathStatistics statistics;
+  const PathOptions options;
+  for (int i = 0; i < kPathsPerVertex * count && static_cast<int>(chosen.size()) < count; ++i) {
+    Rng rng(kVertexSeed, 0, i);
+    const Vec2 pixel = rng.uniform2();
+    const Ray ray = camera.sample(static_cast<int>(pixel.x() * static_cast<float>(camera.width())),
+                                  static_cast<int>(pixel.y() * static_cast<float>(camera.height())), rng);
+    std::vector<SurfaceHit> vertices;
+    const NotingSampler noting{sampler, vertices};
+    PathLoop(scene, options, noting).radiance(ray, rng, statistics);
+    if (vertices.empty()) continue;
+    chosen.push_back(vertices[static_cast<std::size_t>(rng.uniform() * static_cast<float>(vertices.size()))]);
+  }
+  return chosen;
+}
+
+/// Mixtures of both factors, merged up to a cost.
+struct ReducedFactors {
+  ReducedFactors(const Options& o, const Scene& scene, const IlluminationCache& trained, double cost)
+      : threshold(cost),
+        illumination(cost > 0 ? reduced(trained, static_cast<float>(cost)) : trained),
+        caches(o.cacheFolder, lobeRequests(scene), fmt::format("lobefit {} -o {}", o.scene, o.cacheFolder),
+               static_cast<float>(cost)),
+        sampler(scene, illumination, &caches) {}
+  ReducedFactors(const ReducedFactors&) = delete;
+  ReducedFactors& operator=(const ReducedFactors&) = delete;
+
+  double threshold;
+  IlluminationCache illumination;
+  BrdfCaches caches;
+  GuidedSampler sampler;
+};
+
+/// All that vertices are examined with.
+struct Laboratory {
+  const RenderScene& scene;
+  const Integrator& paths;
+  const GuidedSampler& guided;
+  const GuidedSampler& product;
+  const Options& options;
+};
+
+/// f |cosθ| L at a vertex, by directions from the BSDF, both guided densities, the environment, and uniform ones, as
+/// many of each, weighted as by one density (balance heuristic).
+class Survey {
+ public:
+  Survey(const Laboratory& lab, const SurfaceHit& hit, std::uint64_t stream)
+      : lab_(lab), hit_(hit), guided_(lab.guided, hit), product_(lab.product, hit), rng_(kVertexSeed, 1, stream) {}
+
+  ReceivedLight run() {
+    const int strategies = environment() ? 5 : 4;
+    each_ = lab_.options.directions / strategies / 2 * 2;
+    for (int strategy = 0; strategy < strategies; ++strategy)
+      for (int i = 0; i < each_; ++i)
+        if (const std::optional<Vec3> wi = draw(strategy)) look(*wi, i % 2 == 0);
+    return ReceivedLight(std::move(samples_));
+  }
+
+ private:
+  const EnvironmentLight* environment() const { return lab_.scene.lights.environment(); }
+
+  std::optional<Vec3> draw(int strategy) {
+    const auto direction = [](const std::optional<BsdfSample>& s) { return s ? std::optional(s->wi) : std::nullopt; };
+    const float choice = rng_.uniform();
+    switch (strategy) {
+      case 0:
+        return direction(hit_.bsdf->sample(hit_.wo, hit_.uv, choice, rng_.uniform2()));
+      case 1:
+        return direction(guided_.sample(rng_, statistics_));
+      case 2:
+        return direction(product_.sample(rng_, statistics_));
+      case 3:
+        return squareToSphere(rng_.uniform2());
+      default: {
+        const auto sample = environment()->sample(rng_.uniform2());
+        return sample ? std::optional(hit_.frame.toLocal(sample->wi)) : std::nullopt;
+      }
+    }
+  }
+
+  double density(const Vec3& local, const Vec3& world) const {
+    constexpr double uniform = 0.25 * std::numbers::inv_pi;
+    const double all = static_cast<double>(hit_.bsdf->pdf(hit_.wo, local, hit_.uv)) + guided_.pdf(local) +
+                       product_.pdf(local) + uniform + (environment() ? environment()->pdf(world) : 0.0f);
+    return each_ * all;
+  }
+
+  void look(const Vec3& local, bool even) {
+    const Vec3 world = hit_.frame.toWorld(local).normalized();
+    if (!sidesAgree(hit_, world, local)) return;
+    const Rgb f = hit_.bsdf->eval(hit_.wo, local, hit_.uv) * std::abs(local.z());
+    if (!(f.maxCoeff() > 0)) return;
+    const Receiver receiver{hit_, std::copysign(1.0f, hit_.normal.dot(world)) * hit_.normal};
+    const Ray ray = spawnRay(hit_, world);
+    const Rgb covered = coveredEmission(lab_.scene, receiver, ray);
+    const double first = estimate(f, ray, covered), second = estimate(f, ray, covered);
+    samples_.push_back({local, density(local, world), first, second, even});
+  }
+
+  double estimate(const Rgb& f, const Ray& ray, const Rgb& covered) {
+    double sum = 0;
+    for (int i = 0; i < lab_.options.paths; ++i) {
+      const float value = luminance(Rgb(f * (lab_.paths.radiance(ray, rng_, statistics_) - covered)));
+      if (std::isfinite(value)) sum += std::max(0.0f, value);
+    }
+    return sum / lab_.options.paths;
+  }
+
+  const Laboratory& lab_;
+  const SurfaceHit& hit_;
+  GuidedSampler::Vertex guided_, product_;
+  Rng rng_;
+  PathStatistics statistics_;
+  int each_ = 0;
+  std::vector<ReceivedLight::Sample> samples_;
+};
+
+/// Where a convex function of one number is least in [low, high], by golden section.
+double leastAt(const std::function<double(double)>& function, double low, double high) {
+  constexpr double golden = 0.6180339887498949;
+  double left = high - golden * (high - low), right = low + golden * (high - low);
+  double atLeft = function(left), atRight = function(right);
+  for (int i = 0; i < 24; ++i) {
+    if (atLeft < atRight) {
+      high = right, right = left, atRight = atLeft;
+      left = high - golden * (high - low), atLeft = function(left);
+    } else {
+      low = left, left = right, atLeft = atRight;
+      right = low + golden * (high - low), atRight = function(right);
+    }
+  }
+  return 0.5 * (low + high);
+}
+
+/// The densities of which the NEVs are reported, before those of reduced mixtures. Shares of the BSDF against the
+/// mixtures are the product's own, or the best for each vertex: by Kullback–Leibler divergence, or by the NEV itself.
+constexpr std::array kDensityNames{"bsdf", "guided", "product", "product_share_by_kl", "product_share_by_nev"};
+
+/// What is found at one vertex.
+struct Grade {
+  GuidingDecision decision = GuidingDecision::noRecord;
+  std::vector<double> nevs;  ///< kDensityNames, then each reduction; empty: no light was seen
+  double share = 1;          ///< of the BSDF in the product's density
+  double bestShare = 1;      ///< by NEV
+};
+
+/// The product's density with other shares of BSDF and mixtures.
+class Reshared {
+ public:
+  Reshared(const GuidedSampler::Vertex& product, const SurfaceHit& hit, const ReceivedLight& light)
+      : product_(product), hit_(hit), light_(light) {}
+
+  double pdf(const Vec3& wi, double share) const {
+    const double own = product_.bsdfShare(), bsdf = hit_.bsdf->pdf(hit_.wo, wi, hit_.uv);
+    return share * bsdf + (1 - share) * std::max(0.0, product_.pdf(wi) - own * bsdf) / (1 - own);
+  }
+  std::optional<double> nev(double share) const {
+    return light_.nev([&](const Vec3& wi) { return pdf(wi, share); });
+  }
+  double shareByNev() const {
+    return best([&](double share) { return *nev(share); });
+  }
+  double shareByKl() const {
+    return best([&](double share) {
+      double sum = 0;
+      for (const ReceivedLight::Sample& s : light_.samples())
+        sum -= (s.first + s.second) / s.density * std::log(pdf(s.wi, share));
+      return sum;
+    });
+  }
+
+ private:
+  /// Some of the BSDF there has to be.
+  static double best(const std::function<double(double)>& loss) { return leastAt(loss, 0.02, 1); }
+
+  const GuidedSampler::Vertex& product_;
+  const SurfaceHit& hit_;
+  const ReceivedLight& light_;
+};
+
+Grade gradeVertex(const Laboratory& lab, const std::deque<ReducedFactors>& reductions, const SurfaceHit& hit,
+                  std::uint64_t stream) {
+  const ReceivedLight light = Survey(lab, hit, stream).run();
+  const auto nev = [&](const GuidedSampler& sampler) {
+    const GuidedSampler::Vertex vertex(sampler, hit);
+    return light.nev([&](const Vec3& wi) { return vertex.pdf(wi); });
+  };
+  const GuidedSampler::Vertex product(lab.product, hit);
+  Grade grade{.decision = product.decision(), .nevs = {}, .share = product.bsdfShare(), .bestShare = 1};
+  const auto bsdf = light.nev([&](const Vec3& wi) { return hit.bsdf->pdf(hit.wo, wi, hit.uv); });
+  if (!bsdf) return grade;
+  grade.nevs = {*bsdf, *nev(lab.guided), *nev(lab.product)};
+  if (grade.share < 1) {
+    const Reshared reshared(product, hit, light);
+    grade.bestShare = reshared.shareByNev();
+    grade.nevs.push_back(*reshared.nev(reshared.shareByKl()));
+    grade.nevs.push_back(*reshared.nev(grade.bestShare));
+  } else {
+    grade.nevs.insert(grade.nevs.end(), 2, grade.nevs.back());
+  }
+  for (const ReducedFactors& r : reductions) grade.nevs.push_back(*nev(r.sampler));
+  return grade;
+}
+
+std::vector<Grade> gradeAll(const Laboratory& lab, const std::deque<ReducedFactors>& reductions,
+                            const std::vector<SurfaceHit>& vertices) {
+  std::vector<Grade> grades(vertices.size());
+  Progress progress("vertices", static_cast<double>(vertices.size()));
+  oneapi::tbb::parallel_for(std::size_t{0}, vertices.size(), [&](std::size_t i) {
+    grades[i] = gradeVertex(lab, reductions, vertices[i], i);
+    progress.advance();
+  });
+  return grades;
+}
+
+/// Of the density of that place in Grade::nevs, over the vertices that see light.
+nlohmann::ordered_json summary(const std::vector<Grade>& grades, std::size_t density) {
+  std::vector<double> nevs;
+  for (const Grade& g : grades)
+    if (!g.nevs.empty()) nevs.push_back(g.nevs[density]);
+  if (nevs.empty()) return nullptr;
+  std::ranges::sort(nevs);
+  return {{"median", quantile(nevs, 0.5)}, {"p90", quantile(nevs, 0.9)}, {"p99", quantile(nevs, 0.99)}};
+}
+
+nlohmann::ordered_json decisionCounts(const std::vector<Grade>& grades) {
+  std::array<int, kGuidingDecisionNames.size()> counts{};
+  for (const Grade& g : grades) ++counts[static_cast<std::size_t>(g.decision)];
+  nlohmann::ordered_json json;
+  for (std::size_t i = 0; i < counts.size(); ++i) json[kGuidingDecisionNames[i]] = counts[i];
+  return json;
+}
+
+nlohmann::ordered_json report(const std::vector<Grade>& grades, const std::deque<ReducedFactors>& reductions) {
+  const auto lit = std::ranges::count_if(grades, [](const Grade& g) { return !g.nevs.empty(); });
+  const auto above =
+      std::ranges::count_if(grades, [](const Grade& g) { return !g.nevs.empty() && g.nevs[2] > g.nevs[1]; });
+  nlohmann::ordered_json json{{"vertices", grades.size()}, {"lit", lit}, {"decisions", decisionCounts(grades)}};
+  for (std::size_t i = 0; i < kDensityNames.size(); ++i) json["nev"][kDensityNames[i]] = summary(grades, i);
+  json["product_above_guided_share"] =
+      static_cast<double>(above) / static_cast<double>(std::max<std::ptrdiff_t>(lit, 1));
+  json["reduction"] = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i < reductions.size(); ++i) {
+    nlohmann::ordered_json row{{"threshold", reductions[i].threshold},
+                               {"record_components", reductions[i].illumination.meanComponents()},
+                               {"lobe_components", reductions[i].caches.meanComponents()}};
+    row["nev"] = summary(grades, kDensityNames.size() + i);
+    json["reduction"].push_back(row);
+  }
+  return json;
+}
+
+void run(Options& o) {
+  std::optional<oneapi::tbb::global_control> limit;
+  if (o.threads > 0) limit.emplace(oneapi::tbb::global_control::max_allowed_parallelism, o.threads);
+  o.plan.validate();
+  const Scene scene = o.readScene();
+  const RenderScene renderScene(scene);
+  const RayCamera camera(scene.camera, scene.filter);
+  const BrdfCaches caches(o.cacheFolder, lobeRequests(scene), fmt::format("lobefit {} -o {}", o.scene, o.cacheFolder));
+  const TrainedIllumination trained = trainIllumination(renderScene, camera, &caches, o.plan);
+  std::deque<ReducedFactors> reductions;
+  for (const double threshold : o.reductions) reductions.emplace_back(o, scene, trained.cache, threshold);
+  const GuidedSampler guided(scene, trained.cache, nullptr), product(scene, trained.cache, &caches);
+  const GuidedIntegrator paths(renderScene, {}, product);
+  const std::vector<SurfaceHit> vertices = verticesOfPaths(renderScene, camera, product, o.vertices);
+  const Laboratory lab{renderScene, paths, guided, product, o};
+  fmt::print("{}\n", report(gradeAll(lab, reductions, vertices), reductions).dump(2));
+}
+
+void declare(CLI::App& app, Options& o) {
+  o.declare(app);
+  app.add_option("--cache", o.cacheFolder, "Folder of the caches that lobefit made")->capture_default_str();
+  app.add_option("--train", o.plan.from, "What records learn from")
+      ->transform(CLI::CheckedTransformer(trainFromNames()))
+      ->default_str("both");
+  app.add_option("--passes", o.plan.passes, "Of training")->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--vertices", o.vertices, "Where to look")->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--directions", o.directions, "To look into from each vertex")
+      ->check(CLI::Range(16, 1 << 20))
+      ->capture_default_str();
+  app.add_option("--paths", o.paths, "Along each direction, twice: the more, the less is missed of what is rare")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--reductions", o.reductions, "Costs up to which to merge mixtures, separated by commas")
+      ->delimiter(',')
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  return lobe::runTool(
+      "lobebench-vertices",
+      "Trains a scene and grades the densities of directions at random vertices of its paths by the NEV of one sample "
+      "of BSDF times cosine times light; prints JSON. Light straight from an emitter counts with the share that "
+      "multiple importance sampling would leave to cosine-weighted directions.",
+      argc, argv, [&](CLI::App& app) { declare(app, options); }, [&] { run(options); });
+}
