@@ -1,0 +1,72 @@
+// What a renderer really samples: products of records and caches of a scene, against the density that they say.
+
+#include <catch2/catch.hpp>
+
+#include "tests/chi2.h"
+#include "tests/studio.h"
+
+using namespace lobe;
+using lobe::test::Studio;
+
+namespace {
+
+constexpr int kRecords = 20, kReflectances = 5;
+constexpr Chi2Options kFew{.samples = 5000, .bins = 64};
+
+/// Reflectances of different lobes and directions, all with components, seen in the plane that a guide would turn.
+std::vector<Reflectance> someReflectances(const Studio& studio) {
+  const int lobes = static_cast<int>(lobeRequests(studio.scene()).size());
+  std::vector<Reflectance> found;
+  Rng rng(31);
+  while (static_cast<int>(found.size()) < kReflectances) {
+    const float z = 0.1f + 0.9f * rng.uniform(), r = std::sqrt(1 - z * z);
+    const Vec2 azimuth = Eigen::Rotation2Df(6.28f * rng.uniform()) * Vec2::UnitX(),
+               turn = Eigen::Rotation2Df(6.28f * rng.uniform()) * Vec2::UnitX();
+    Reflectance reflectance;
+    // Every other one has a diffuse part.
+    reflectance.constant = found.size() % 2 == 0 ? 0.1f : 0.0f;
+    reflectance.backgroundMass = reflectance.constant;
+    const int lobe = static_cast<int>(found.size()) * lobes / kReflectances;
+    studio.caches().add(lobe, {r * azimuth.x(), r * azimuth.y(), z}, turn, 0.7f, reflectance);
+    if (reflectance.gaussians.count() > 0) found.push_back(reflectance);
+  }
+  return found;
+}
+
+/// Of what is not left to the BSDF's own sampler.
+Chi2Result ofMixtures(const GuidedDensity& density, std::uint64_t stream, float mutant = 1) {
+  Rng rng(32, stream);
+  const auto draw = [&]() -> std::optional<Vec3> {
+    // The part of [0,1) behind the BSDF's share.
+    float choice = std::min(density.bsdfShare() + (1 - density.bsdfShare()) * rng.uniform(), 0x1.fffffep-1f);
+    const Strategy strategy = density.choose(choice);
+    if (strategy == Strategy::bsdf) return std::nullopt;
+    return density.sample(strategy, choice, rng.uniform2());
+  };
+  const float share = (1 - density.bsdfShare()) / mutant;
+  return chi2Sphere(
+      draw, [&](const Vec3& wi) { return density.guidedPdf(wi) / share; }, kFew);
+}
+
+}  // namespace
+
+TEST_CASE("unbiased: samples of trained records and fitted lobes have the density that is said", "[slow]") {
+  const Studio studio(readScene(std::string(LOBE_SOURCE_DIR) + "/scenes/jewelry.xml"), 60, 40);
+  const std::vector<Reflectance> reflectances = someReflectances(studio);
+  const std::vector<IlluminationRecord> records = studio.illumination().records();
+  REQUIRE(records.size() >= kRecords);
+  int mutantsSeen = 0;
+  for (std::size_t i = 0; i < kRecords; ++i) {
+    const IlluminationRecord& record = records[i * records.size() / kRecords];
+    const IlluminationCache alone({record}, studio.illumination().unit());
+    const PackedRecord& packed = *alone.find(record.position, record.normal);
+    for (std::size_t j = 0; j < reflectances.size(); ++j) {
+      const GuidedDensity density(reflectances[j], packed, kProductShares);
+      const Chi2Result result = ofMixtures(density, i * kReflectances + j);
+      INFO("record " << i << ", reflectance " << j << ": " << result.message);
+      CHECK(result.passed(kRecords * kReflectances));
+      if (j == 0) mutantsSeen += !ofMixtures(density, i, 1.1f).passed(kRecords * kReflectances);
+    }
+  }
+  CHECK(mutantsSeen == kRecords);
+}
