@@ -12,6 +12,7 @@ namespace {
 constexpr float kMinNormalCosine = 0.75f;  // about 41°
 // Cells of the largest radius: a record lies in few of them, and a cell holds few records.
 constexpr float kCellsPerUnit = 1.0f;
+constexpr float kRounding = 1e-3f;  // of a cell: a point may be found in the cell next to its own
 
 Eigen::Vector3i cellOf(const Vec3& x, float inverseCellSize) {
   return (x * inverseCellSize).array().floor().cast<int>();
@@ -35,34 +36,42 @@ void prefetch(const PackedRecord& record) {
 IlluminationCache::IlluminationCache(const std::vector<IlluminationRecord>& records, float unit)
     : unit_(unit), inverseCellSize_(kCellsPerUnit / unit) {
   for (const IlluminationRecord& record : records) pack(record);
-  struct Placement {
-    std::uint64_t key;
-    std::uint32_t record;
-  };
+  const std::vector<Placement> placements = placeInCells();
+  std::vector<Cell> cells;
+  entries_.reserve(placements.size());
+  for (const Placement& p : placements) {
+    const auto next = static_cast<std::uint32_t>(entries_.size());
+    if (cells.empty() || cells.back().key != p.key) cells.push_back({p.key, next, next});
+    ++cells.back().end;
+    const Place& r = places_[p.record];
+    entries_.push_back({r.position, r.normal, r.radius * r.radius, r.block});
+  }
+  table_.assign(std::bit_ceil(2 * cells.size() + 2), Cell{0, 0, 0});
+  for (const Cell& cell : cells) {
+    std::size_t slot = slotOf(cell.key, table_.size());
+    while (table_[slot].begin != table_[slot].end) slot = (slot + 1) & (table_.size() - 1);
+    table_[slot] = cell;
+  }
+}
+
+std::vector<IlluminationCache::Placement> IlluminationCache::placeInCells() const {
   std::vector<Placement> placements;
   for (std::uint32_t i = 0; i < places_.size(); ++i) {
     const Place& r = places_[i];
-    const Eigen::Vector3i low = cellOf(r.position - Vec3::Constant(r.radius), inverseCellSize_);
-    const Eigen::Vector3i high = cellOf(r.position + Vec3::Constant(r.radius), inverseCellSize_);
+    const Vec3 centre = r.position * inverseCellSize_;  // in cells
+    const float radius = r.radius * inverseCellSize_ + kRounding;
+    const Eigen::Vector3i low = (centre.array() - radius).floor().cast<int>();
+    const Eigen::Vector3i high = (centre.array() + radius).floor().cast<int>();
     for (int z = low.z(); z <= high.z(); ++z)
       for (int y = low.y(); y <= high.y(); ++y)
-        for (int x = low.x(); x <= high.x(); ++x) placements.push_back({cellKey({x, y, z}), i});
+        for (int x = low.x(); x <= high.x(); ++x) {
+          const Vec3 corner(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z));
+          const Eigen::AlignedBox3f cell(corner, corner + Vec3::Ones());
+          if (cell.squaredExteriorDistance(centre) <= radius * radius) placements.push_back({cellKey({x, y, z}), i});
+        }
   }
   std::ranges::sort(placements, {}, [](const Placement& p) { return std::pair(p.key, p.record); });
-
-  table_.assign(std::bit_ceil(2 * placements.size() + 2), Cell{0, 0, 0});
-  entries_.reserve(placements.size());
-  for (std::size_t i = 0; i < placements.size();) {
-    const std::uint64_t key = placements[i].key;
-    const auto begin = static_cast<std::uint32_t>(entries_.size());
-    for (; i < placements.size() && placements[i].key == key; ++i) {
-      const Place& r = places_[placements[i].record];
-      entries_.push_back({r.position, r.normal, r.radius * r.radius, r.block});
-    }
-    std::size_t slot = slotOf(key, table_.size());
-    while (table_[slot].begin != table_[slot].end) slot = (slot + 1) & (table_.size() - 1);
-    table_[slot] = {key, begin, static_cast<std::uint32_t>(entries_.size())};
-  }
+  return placements;
 }
 
 void IlluminationCache::pack(const IlluminationRecord& record) {

@@ -64,7 +64,7 @@ class IlluminationCache {
 
  private:
   // What find looks at, copied into cell order so that a cell is one run of memory.
-  struct Entry {
+  struct alignas(32) Entry {
     Vec3 position;
     Vec3 normal;
     float radius2;
@@ -84,7 +84,13 @@ class IlluminationCache {
   struct alignas(32) Block {
     std::array<float, 8> floats;
   };
+  struct Placement {
+    std::uint64_t key;  // of the cell
+    std::uint32_t record;
+  };
   void pack(const IlluminationRecord& record);
+  /// Every record in every cell that it reaches into, ordered by cells.
+  std::vector<Placement> placeInCells() const;
   const PackedRecord& at(std::uint32_t block) const { return reinterpret_cast<const PackedRecord&>(blocks_[block]); }
   std::uint64_t cellKey(const Eigen::Vector3i& cell) const;
   const Cell* findCell(std::uint64_t key) const;
