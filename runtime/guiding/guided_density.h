@@ -20,10 +20,9 @@ struct StrategyShares {
   float product, bsdf, illumination;
 };
 
-/// Measured (targets): more of the product once a record has seen enough.
-inline constexpr StrategyShares kProductShares{0.85f, 0.10f, 0.05f};
-inline constexpr StrategyShares kUncertainProductShares{0.80f, 0.10f, 0.10f};
-inline constexpr float kUncertainSamples = 250;
+/// Measured (scripts/bench-vertices): with more of the product, vertices where the record does not fit the light get
+/// worse than half and half; with less, all others do.
+inline constexpr StrategyShares kProductShares{0.70f, 0.20f, 0.10f};
 /// Vorba et al. 2014.
 inline constexpr StrategyShares kGuidedShares{0.0f, 0.5f, 0.5f};
 

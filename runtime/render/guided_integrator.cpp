@@ -42,11 +42,6 @@ float coveredShare(const Reflectance& reflectance) {
 constexpr float kUndersampled = 40;
 constexpr float kEvenBackground = 0.98f;
 
-StrategyShares sharesFor(GuidingDecision decision, const PackedRecord& record) {
-  if (decision == GuidingDecision::undersampled) return kGuidedShares;
-  return record.samples < kUncertainSamples ? kUncertainProductShares : kProductShares;
-}
-
 }  // namespace
 
 std::vector<LobeRequest> lobeRequests(const Scene& scene) {
@@ -77,9 +72,9 @@ GuidedSampler::Vertex::Vertex(const GuidedSampler& sampler, const SurfaceHit& hi
   if (product_) collectReflectance(sampler, hit, mixture, side);
   const float covered = (1 - mixture.transmittedShare) * coveredShare(reflectance_);
   decision_ = decide(*record, covered);
+  const bool halves = !product_ || decision_ == GuidingDecision::undersampled;
   if (decision_ != GuidingDecision::narrow && decision_ != GuidingDecision::even)
-    density_.emplace(reflectance_, *record,
-                     onCovered(product_ ? sharesFor(decision_, *record) : kGuidedShares, covered));
+    density_.emplace(reflectance_, *record, onCovered(halves ? kGuidedShares : kProductShares, covered));
 }
 
 GuidingDecision GuidedSampler::Vertex::decide(const PackedRecord& record, float covered) const {
