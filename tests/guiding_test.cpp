@@ -8,6 +8,7 @@
 #include "runtime/guiding/guided_density.h"
 #include "runtime/guiding/illumination_trainer.h"
 #include "runtime/mixture/random.h"
+#include "tests/mixtures_chi2.h"
 
 using namespace lobe;
 
@@ -302,6 +303,50 @@ TEST_CASE("guiding: what is sampled has the density that is said") {
     CHECK(density.bsdfShare() >= shares.bsdf);
     CHECK(largestDeviation(density, 1.0) < 5);
     CHECK(largestDeviation(density, 1.1) > 5);  // a density that is wrong by a tenth is seen
+  }
+}
+
+namespace {
+
+Reflectance oneLobe(const Gaussian& g) {
+  Reflectance r;
+  r.backgroundMass = 0.1f;
+  r.gaussians.add(g);
+  return r;
+}
+
+IlluminationRecord oneLight(const Gaussian& g) {
+  IlluminationRecord r = recordAt(Vec3::Zero(), Vec3::UnitZ(), 1);
+  r.count = 1;
+  r.components[0] = g;
+  return r;
+}
+
+}  // namespace
+
+TEST_CASE("guiding: lobes at the limits of what can be are sampled with the density that is said") {
+  struct Case {
+    const char* name;
+    Gaussian reflectance, light;
+  };
+  const auto round = [](float x, float y, float width) { return Gaussian{1, x, y, {width * width, 0, width * width}}; };
+  const std::array cases{
+      Case{"a thousandth wide", round(0.4f, 0.3f, 1e-3f), round(0.401f, 0.3f, 1e-3f)},
+      Case{"a thousandth wide in broad light", round(0.4f, 0.3f, 1e-3f), round(0.2f, 0, 0.3f)},
+      Case{"almost too far apart", round(-0.4f, 0, 0.05f), round(0.4f, 0, 0.05f)},
+      Case{"means outside the disc", round(1.1f, 0.1f, 0.2f), round(0.95f, 0.6f, 0.3f)},
+      Case{"next to nothing inside the disc", round(1.5f, 0, 0.05f), round(1.55f, 0.1f, 0.05f)},
+  };
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    const Reflectance reflectance = oneLobe(cases[i].reflectance);
+    const OneRecord record(oneLight(cases[i].light));
+    for (const StrategyShares& shares : {kProductShares, StrategyShares{0.5f, 0.0f, 0.5f}}) {
+      const GuidedDensity density(reflectance, record.packed, shares);
+      const Chi2Result result = lobe::test::ofMixtures(density, i);
+      INFO(cases[i].name << ": " << result.message);
+      CHECK(result.passed(2 * static_cast<int>(cases.size())));
+      CHECK_FALSE(lobe::test::ofMixtures(density, i, {}, 1.5f).passed(2 * static_cast<int>(cases.size())));
+    }
   }
 }
 

@@ -2,10 +2,11 @@
 
 #include <catch2/catch.hpp>
 
-#include "tests/chi2.h"
+#include "tests/mixtures_chi2.h"
 #include "tests/studio.h"
 
 using namespace lobe;
+using lobe::test::ofMixtures;
 using lobe::test::Studio;
 
 namespace {
@@ -33,21 +34,6 @@ std::vector<Reflectance> someReflectances(const Studio& studio) {
   return found;
 }
 
-/// Of what is not left to the BSDF's own sampler.
-Chi2Result ofMixtures(const GuidedDensity& density, std::uint64_t stream, float mutant = 1) {
-  Rng rng(32, stream);
-  const auto draw = [&]() -> std::optional<Vec3> {
-    // The part of [0,1) behind the BSDF's share.
-    float choice = std::min(density.bsdfShare() + (1 - density.bsdfShare()) * rng.uniform(), 0x1.fffffep-1f);
-    const Strategy strategy = density.choose(choice);
-    if (strategy == Strategy::bsdf) return std::nullopt;
-    return density.sample(strategy, choice, rng.uniform2());
-  };
-  const float share = (1 - density.bsdfShare()) / mutant;
-  return chi2Sphere(
-      draw, [&](const Vec3& wi) { return density.guidedPdf(wi) / share; }, kFew);
-}
-
 }  // namespace
 
 TEST_CASE("unbiased: samples of trained records and fitted lobes have the density that is said", "[slow]") {
@@ -62,10 +48,10 @@ TEST_CASE("unbiased: samples of trained records and fitted lobes have the densit
     const PackedRecord& packed = *alone.find(record.position, record.normal);
     for (std::size_t j = 0; j < reflectances.size(); ++j) {
       const GuidedDensity density(reflectances[j], packed, kProductShares);
-      const Chi2Result result = ofMixtures(density, i * kReflectances + j);
+      const Chi2Result result = ofMixtures(density, i * kReflectances + j, kFew);
       INFO("record " << i << ", reflectance " << j << ": " << result.message);
       CHECK(result.passed(kRecords * kReflectances));
-      if (j == 0) mutantsSeen += !ofMixtures(density, i, 1.1f).passed(kRecords * kReflectances);
+      if (j == 0) mutantsSeen += !ofMixtures(density, i, kFew, 1.1f).passed(kRecords * kReflectances);
     }
   }
   CHECK(mutantsSeen == kRecords);
