@@ -12,7 +12,7 @@ using lobe::test::Studio;
 namespace {
 
 constexpr int kRecords = 20, kReflectances = 5;
-constexpr Chi2Options kFew{.samples = 5000, .bins = 64};
+constexpr Chi2Options kFew{.samples = 20000, .bins = 64};
 
 /// Reflectances of different lobes and directions, all with components, seen in the plane that a guide would turn.
 std::vector<Reflectance> someReflectances(const Studio& studio) {
@@ -51,8 +51,8 @@ TEST_CASE("unbiased: samples of trained records and fitted lobes have the densit
       const Chi2Result result = ofMixtures(density, i * kReflectances + j, kFew);
       INFO("record " << i << ", reflectance " << j << ": " << result.message);
       CHECK(result.passed(kRecords * kReflectances));
-      if (j == 0) mutantsSeen += !ofMixtures(density, i, kFew, 1.1f).passed(kRecords * kReflectances);
+      if (j == 0 && i % 4 == 0) mutantsSeen += !ofMixtures(density, i, kFew, 1.1f).passed(kRecords * kReflectances);
     }
   }
-  CHECK(mutantsSeen == kRecords);
+  CHECK(mutantsSeen == kRecords / 4);
 }
