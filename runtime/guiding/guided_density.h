@@ -20,8 +20,8 @@ struct StrategyShares {
   float product, bsdf, illumination;
 };
 
-/// Measured (scripts/bench-vertices): with more of the product, vertices where the record does not fit the light get
-/// worse than half and half; with less, all others do.
+/// Measured (scripts/bench-vertices): with more of the product the worst vertices get worse and the median no better;
+/// with less the median gets worse.
 inline constexpr StrategyShares kProductShares{0.70f, 0.20f, 0.10f};
 /// Vorba et al. 2014.
 inline constexpr StrategyShares kGuidedShares{0.0f, 0.5f, 0.5f};
