@@ -175,6 +175,14 @@ FittedGrid fitEveryEntry(const Lobe& lobe, const DirectionGrid& grid, const FitS
   return result;
 }
 
+/// Of a black lobe: one record without components, which leaves it to the BSDF's own sampling.
+FittedGrid withoutFit(const DirectionGrid& grid) {
+  FittedGrid result;
+  result.append({{}, {}}, 0);
+  result.lookup.assign(static_cast<std::size_t>(grid.count), 0);
+  return result;
+}
+
 }  // namespace
 
 FitSettings defaultFitSettings() {
@@ -228,9 +236,8 @@ FittedGrid fitGrid(const Lobe& lobe, const DirectionGrid& grid, const FitSetting
                    const std::function<void()>& advance) {
   FittedGrid result =
       settings.fixedGrid ? fitEveryEntry(lobe, grid, settings, advance) : fitAdaptively(lobe, grid, settings, advance);
-  if (std::ranges::none_of(result.records, [](const CacheRecord& r) { return r.integral > 0; }))
-    throw std::runtime_error(fmt::format("lobe {} cannot be fitted: none of its samples has a value", lobe.summary()));
-  return result;
+  const bool black = std::ranges::none_of(result.records, [](const CacheRecord& r) { return r.integral > 0; });
+  return black ? withoutFit(grid) : result;
 }
 
 int workOf(const CompileJob& job) {

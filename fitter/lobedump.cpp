@@ -15,6 +15,11 @@
 
 namespace {
 
+/// Strings of damaged files may be no text.
+std::string dumped(const nlohmann::ordered_json& json) {
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
 using namespace lobe;
 
 constexpr int kPlotRows = 5;
@@ -94,7 +99,7 @@ void validate(const Options& o) {
 void printJson(const std::vector<LobeCache>& caches, const Options& o) {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (std::size_t i = 0; i < caches.size(); ++i) json.push_back(toJson(caches[i], o.files[i]));
-  fmt::print("{}\n", json.dump(2));
+  fmt::print("{}\n", dumped(json));
 }
 
 void printText(const std::vector<LobeCache>& caches, const Options& o) {
@@ -114,7 +119,7 @@ bool runDiff(const LobeCache& a, const LobeCache& b, const Options& o) {
   const CacheDifference difference = compareCaches(a, b);
   const CachePair caches{a, b, o.files[0], o.files[1]};
   if (o.json)
-    fmt::print("{}\n", toJson(difference, caches).dump(2));
+    fmt::print("{}\n", dumped(toJson(difference, caches)));
   else
     printDifference(difference, caches, stdout);
   return difference.equal;
@@ -207,7 +212,7 @@ void runIllumination(const Options& o) {
     printIllumination(files[i], o.files[i], stdout);
     if (o.records) printRecords(files[i], stdout);
   }
-  if (o.json) fmt::print("{}\n", json.dump(2));
+  if (o.json) fmt::print("{}\n", dumped(json));
 }
 
 /// false: --diff found a difference.

@@ -99,6 +99,22 @@ void say(const std::vector<CacheReport>& reports, const Options& o) {
     fmt::print(stderr, "lobefit: {} of {} lobes written to {}\n", fresh, reports.size(), o.compile.directory.string());
 }
 
+/// What was asked for and is not reached has to be seen.
+void sayWhatMisses(const std::vector<CacheReport>& reports, const Options& o) {
+  if (o.compile.settings.method != kMethodAuto) return;
+  const float quality = o.compile.settings.quality;
+  const CacheReport* worst = nullptr;
+  int missing = 0;
+  for (const CacheReport& r : reports) {
+    if (r.summary.nevWorst <= quality) continue;
+    ++missing;
+    if (!worst || r.summary.nevWorst > worst->summary.nevWorst) worst = &r;
+  }
+  if (worst)
+    printNote("lobefit", fmt::format("{} of {} lobes have records above --quality {:g}; the worst NEV is {:.3f}, of {}",
+                                     missing, reports.size(), quality, worst->summary.nevWorst, worst->lobe));
+}
+
 void run(Options& o) {
   validate(o);
   std::optional<tbb::global_control> limit;
@@ -109,6 +125,7 @@ void run(Options& o) {
   for (const std::string& warning : scene.warnings) printWarning("lobefit", warning);
   const std::vector<CacheReport> reports = compileAll(planCompile(collectLobes(scene), o.compile));
   say(reports, o);
+  sayWhatMisses(reports, o);
   printResult(reports, o);
 }
 

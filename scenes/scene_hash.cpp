@@ -96,4 +96,21 @@ std::uint64_t lightHash(const Scene& scene) {
   return hash.value();
 }
 
+std::uint64_t pictureHash(const Scene& scene) {
+  Fingerprint hash;
+  hash.number(lightHash(scene));
+  const Camera& camera = scene.camera;
+  const FilmCrop picture = camera.picture();
+  hash.number(camera.kind);
+  hash.coefficients(camera.toWorld);
+  for (const int pixels : {camera.width, camera.height, picture.x, picture.y, picture.width, picture.height})
+    hash.number(pixels);
+  for (const float value :
+       {camera.horizontalFov, camera.shift.x(), camera.shift.y(), camera.apertureRadius, camera.focusDistance,
+        scene.filter.radius, scene.filter.stddev, scene.filter.b, scene.filter.c})
+    hash.number(value);
+  hash.number(scene.filter.kind);
+  return hash.value();
+}
+
 }  // namespace lobe

@@ -12,4 +12,7 @@ namespace lobe {
 /// described in different words may differ.
 std::uint64_t lightHash(const Scene& scene);
 
+/// The same of light, camera, film and its filter: of scenes that make the same picture.
+std::uint64_t pictureHash(const Scene& scene);
+
 }  // namespace lobe

@@ -189,11 +189,19 @@ TEST_CASE("fitter: merging saves components") {
   CHECK(fitLobe(*lobe, direction(40), some).mixture.size() < 7);
 }
 
-TEST_CASE("fitter: lobes without value or with values that are no numbers are refused in words") {
+TEST_CASE("fitter: lobes without value are left to the BSDF") {
   const DirectionGrid grid{GridKind::elevation, 4};
-  CHECK_THROWS_WITH(fitGrid(TestLobe(1, false), grid, {}),
-                    Catch::Contains("a test lobe") && Catch::Contains("none of its samples"));
-  CHECK_THROWS_WITH(fitGrid(TestLobe(0), grid, {}), Catch::Contains("none of its samples"));
+  for (const bool samples : {true, false})
+    for (const FitSettings& settings : {FitSettings{}, defaultFitSettings()}) {
+      const FittedGrid fit = fitGrid(TestLobe(samples ? 0 : 1, samples), grid, settings);
+      REQUIRE(fit.records.size() == 1);
+      CHECK((fit.records[0].count == 0 && fit.records[0].integral == 0 && fit.records[0].albedo == 0));
+      CHECK(fit.lookup == std::vector<std::uint32_t>(4, 0));
+    }
+}
+
+TEST_CASE("fitter: lobes with values that are no numbers are refused in words") {
+  const DirectionGrid grid{GridKind::elevation, 4};
   CHECK_THROWS_WITH(fitGrid(TestLobe(std::nan("")), grid, {}), Catch::Contains("its value is nan"));
   CHECK_THROWS_WITH(fitGrid(TestLobe(1, true, 5e-6f), grid, {}), Catch::Contains("too sharp"));
 }

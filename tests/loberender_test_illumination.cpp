@@ -116,6 +116,12 @@ TEST_CASE("loberender: parts of a picture merge to the whole") {
   CHECK(overlap.code == 1);
   CHECK_THAT(overlap.error, Catch::Contains("a.exr and whole.exr: both have samples 0 to 2 of seed 1 by guided"));
   CHECK_FALSE(folder.has("d.exr"));
+
+  REQUIRE(folder.run("loberender scene.xml --integrator path --spp 1 --size 4x4 -o other.exr").code == 0);
+  const ToolRun mixed = folder.run("lobecompare --merge d.exr a.exr other.exr");
+  CHECK(mixed.code == 1);
+  CHECK_THAT(mixed.error, Catch::Contains("of different scenes or cameras"));
+  CHECK_THAT(folder.run("lobecompare --merge d.exr a.exr none.exr").error, Catch::Contains("none.exr: no such file"));
 }
 
 TEST_CASE("lobedump: shows illumination to people, machines and viewers of points") {

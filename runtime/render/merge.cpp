@@ -75,6 +75,7 @@ std::vector<SampleRange> joined(std::vector<SampleRange> ranges) {
 }
 
 Part describe(const std::filesystem::path& path) {
+  if (!std::filesystem::exists(path)) throw std::runtime_error(path.string() + ": no such file");
   Part part{path, readAttributes(path), 0, {}};
   const std::optional<std::uint64_t> samples = findCount(part.attributes, "samples");
   if (!samples || *samples == 0)
@@ -87,6 +88,15 @@ Part describe(const std::filesystem::path& path) {
     throw std::runtime_error(fmt::format("{}: {}", path.string(), e.what()));
   }
   return part;
+}
+
+/// Pictures that do not say what they show are taken on trust.
+void checkSameScene(const Part& a, const Part& b) {
+  const auto one = find<std::string>(a.attributes, "sceneHash"), other = find<std::string>(b.attributes, "sceneHash");
+  if (one && other && *one != *other)
+    throw std::runtime_error(fmt::format(
+        "{} and {}: of different scenes or cameras (sceneHash {} and {}); parts of one picture have to be of one scene",
+        a.path.string(), b.path.string(), *one, *other));
 }
 
 void checkDisjoint(const Part& a, const Part& b) {
@@ -164,6 +174,7 @@ MergedImage mergeImages(std::span<const std::filesystem::path> paths) {
   std::vector<Part> parts;
   for (const auto& path : paths) {
     parts.push_back(describe(path));
+    checkSameScene(parts.front(), parts.back());
     for (std::size_t i = 0; i + 1 < parts.size(); ++i) checkDisjoint(parts[i], parts.back());
   }
   return {weightedMean(parts), mergedAttributes(parts)};

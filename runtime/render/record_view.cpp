@@ -146,7 +146,7 @@ RecordView viewRecord(const RenderScene& scene, const Receiver& receiver, const 
              {{{"mixture", [&](const Vec2& y) { return 2.0 * density.mixture(density.frame().toWorld(fromDisc(y))); }},
                {around.points.empty() ? "particles: none kept" : fmt::format("particles: {}", around.points.size()),
                 [&](const Vec2& y) { return particles.density(y); }},
-               {"light x cosine: path traced", [&](const Vec2& y) { return truth.density(y); }}}});
+               {"light left to guiding x cosine: path traced", [&](const Vec2& y) { return truth.density(y); }}}});
   drawEllipses(view.raster, panelAt(0), record.gaussians());
   drawCaption(view.raster, view.caption);
   return view;

@@ -27,6 +27,7 @@
 #include "runtime/render/stored_illumination.h"
 #include "scenes/camera.h"
 #include "scenes/reader.h"
+#include "scenes/scene_hash.h"
 #include "scenes/tool.h"
 #include "schema/atomic_file.h"
 
@@ -52,6 +53,11 @@ std::string quoted(const std::string& word) {
   return text + "'";
 }
 
+/// The same for all ways to write a path.
+std::filesystem::path placeOf(const std::filesystem::path& path) {
+  return std::filesystem::weakly_canonical(std::filesystem::absolute(path));
+}
+
 /// Every file a job writes can be written and is a file of its own: better said now than after hours.
 void checkFiles(const RenderJob& job) {
   std::vector<std::filesystem::path> written = job.outputs;
@@ -60,9 +66,9 @@ void checkFiles(const RenderJob& job) {
   if (job.record) written.push_back(job.recordImage);
   std::map<std::filesystem::path, int> uses;
   for (const auto& path : {job.scene, job.reference, job.illumination})
-    if (!path.empty()) ++uses[std::filesystem::weakly_canonical(path)];
+    if (!path.empty()) ++uses[placeOf(path)];
   for (const auto& path : written)
-    if (++uses[std::filesystem::weakly_canonical(path)] > 1)
+    if (++uses[placeOf(path)] > 1)
       throw UsageError(fmt::format("{}: would be overwritten, it is named twice", path.string()));
   for (const auto& path : written) checkWritable(path);
 }
@@ -209,12 +215,13 @@ nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, c
           {"nonfinite_samples", run.dropped}};
 }
 
-ImageAttributes attributes(const RenderJob& job, const RunResult& run) {
+ImageAttributes attributes(const RenderJob& job, std::uint64_t sceneHash, const RunResult& run) {
   ImageAttributes all{{"software", fmt::format("Lobe {}", LOBE_VERSION)},
                       {"integrator", std::string(nameOf(job.integrator))},
                       {"seed", static_cast<double>(job.seed)},
                       {"samples", static_cast<double>(run.render.total.samples)},
-                      {"sampleOffset", static_cast<double>(job.sampleOffset)}};
+                      {"sampleOffset", static_cast<double>(job.sampleOffset)},
+                      {"sceneHash", fmt::format("{:016x}", sceneHash)}};
   if (run.guiding.caches) all["cacheHashes"] = fmt::format("{:016x}", fmt::join(run.guiding.caches->hashes(), " "));
   // A picture of so many samples is the same bytes on every run; one of so many seconds never is.
   if (job.seconds) all["seconds"] = run.seconds();
@@ -236,23 +243,32 @@ void train(const RenderJob& job, const RenderScene& scene, const RayCamera& came
     saveIllumination(job.saveIllumination, guiding.training, plan, scene.scene, job.scene);
 }
 
-/// What --record asks for; its faults get the option's name.
-template <class Work>
-auto forRecord(const RenderJob& job, const Work& work) {
+std::string recordFault(const RenderJob& job, const NoRecord& e) {
+  return fmt::format("--record {},{}: {}", job.record->first, job.record->second, e.what());
+}
+
+/// What the pixel of --record shows.
+std::optional<Receiver> receiverFor(const RenderJob& job, const RenderScene& scene, const RayCamera& camera) {
+  if (!job.record) return std::nullopt;
   try {
-    return work();
+    return receiverAt(scene, camera, job.record->first, job.record->second);
   } catch (const NoRecord& e) {
-    throw std::runtime_error(fmt::format("--record {},{}: {}", job.record->first, job.record->second, e.what()));
+    throw std::runtime_error(recordFault(job, e));
   }
 }
 
+/// Where nothing was learnt there is nothing to draw; the picture is made all the same.
 void drawRecord(const RenderJob& job, const RenderScene& scene, const Receiver& receiver,
                 TrainedIllumination& training) {
-  const RecordView view = forRecord(job, [&] { return viewRecord(scene, receiver, training, job.training.records); });
-  view.raster.write(job.recordImage);
-  std::string line = view.caption;
-  std::ranges::replace(line, '\n', ' ');
-  printNote(kTool, fmt::format("{}: {}", job.recordImage.string(), line));
+  try {
+    const RecordView view = viewRecord(scene, receiver, training, job.training.records);
+    view.raster.write(job.recordImage);
+    std::string line = view.caption;
+    std::ranges::replace(line, '\n', ' ');
+    printNote(kTool, fmt::format("{}: {}", job.recordImage.string(), line));
+  } catch (const NoRecord& e) {
+    printWarning(kTool, recordFault(job, e));
+  }
   training.particles = {};  // drawn: rendering needs the memory more
 }
 
@@ -288,7 +304,8 @@ void RenderJob::validate() const {
   const auto require = [](bool condition, const std::string& message) {
     if (!condition) throw UsageError(message);
   };
-  require(samples.has_value() != seconds.has_value(), "either --spp or --seconds has to be given");
+  require(samples || seconds, "either --spp or --seconds has to be given");
+  require(!samples || !seconds, "--spp and --seconds do not go together");
   require(!samples || *samples >= 1, "--spp has to be at least 1");
   require(sampleOffset >= 0, "--sample-offset has to be at least 0");
   require(sampleOffset == 0 || samples,
@@ -349,9 +366,7 @@ void run(const RenderJob& job) {
   load.building = building.seconds();
   load.embree = renderScene.tracer.buildSeconds();
   const RayCamera camera(scene.camera, scene.filter);
-  std::optional<Receiver> receiver;
-  if (job.record)
-    receiver = forRecord(job, [&] { return receiverAt(renderScene, camera, job.record->first, job.record->second); });
+  const std::optional<Receiver> receiver = receiverFor(job, renderScene, camera);
   if (job.integrator != IntegratorKind::path) {
     if (!stored) train(job, renderScene, camera, guiding);
     guiding.reduceRecords(job.reduction);
@@ -366,7 +381,8 @@ void run(const RenderJob& job) {
   const RunResult result{rendered, guiding, film.dropped()};
   if (result.dropped > 0)
     printWarning(kTool, fmt::format("{} samples were negative or not finite and left out", result.dropped));
-  for (const auto& output : job.outputs) writeImage(output, film.mean(), attributes(job, result));
+  const std::uint64_t hash = pictureHash(scene);
+  for (const auto& output : job.outputs) writeImage(output, film.mean(), attributes(job, hash, result));
   log.write();
   if (!job.stats.empty()) writeAtomically(job.stats, statistics(job, load, result).dump(2) + "\n");
 }

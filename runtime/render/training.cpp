@@ -23,7 +23,7 @@ TrainingOptions importanceOptions(TrainingOptions options) {
 /// and double: so even short training is of several passes, and none begins that would end much too late.
 class PassSizes {
  public:
-  explicit PassSizes(const TrainingPlan& plan) : limit_(plan.seconds), next_(limit_ < kInfinity ? kFirst : 1) {}
+  explicit PassSizes(const TrainingPlan& plan) : limit_(plan.seconds), next_(limit_ < kInfinity ? firstOf(plan) : 1) {}
 
   /// Of the next pass, in (0, 1]; nullopt: it would not end in time. The first pass always is.
   std::optional<double> next() const {
@@ -43,7 +43,10 @@ class PassSizes {
   }
 
  private:
-  static constexpr double kFirst = 1.0 / 16;
+  static double firstOf(const TrainingPlan& plan) {
+    constexpr double kFirstParticles = 25000;  // a fifth of a second in the kitchen
+    return std::min(1.0, kFirstParticles / (static_cast<double>(plan.photons) + plan.importons));
+  }
 
   double limit_, next_;
   double last_ = 0, taken_ = 0;  // size and seconds of the last pass
