@@ -11,7 +11,7 @@ namespace {
 
 constexpr float kMinNormalCosine = 0.75f;  // about 41°
 // Cells of the largest radius: a record lies in few of them, and a cell holds few records.
-constexpr float kCellsPerUnit = 1.0f;
+constexpr float kCellsPerUnit = 0.5f;
 constexpr float kRounding = 1e-3f;  // of a cell: a point may be found in the cell next to its own
 
 Eigen::Vector3i cellOf(const Vec3& x, float inverseCellSize) {
