@@ -21,6 +21,7 @@ struct Options {
   std::string scene;
   CompileOptions compile;
   ReadOptions read;
+  std::optional<float> quality, reduction;  // where given
   int threads = 0;
   bool json = false;
 };
@@ -32,18 +33,29 @@ void declare(CLI::App& app, Options& o) {
                  "How records are fitted: auto (what is enough for --quality), wem (weighted EM), ceres (least squares "
                  "for the product) or eq8 (the paper's)");
   app.add_option("--components", o.compile.settings.components, "Gaussians of a record, with auto at most so many");
-  app.add_option("--quality", o.compile.settings.quality,
-                 "With auto, the NEV of a record's use in a product that is good enough");
+  app.add_option("--quality", o.quality, "With auto, the NEV of a record's use in a product that is good enough")
+      ->default_str(fmt::format("{:g}", o.compile.settings.quality));
   app.add_option("--elevations", o.compile.elevations, "So many records for every isotropic lobe, needed or not");
   app.add_option("--directions", o.compile.directions, "So many records for every anisotropic lobe, needed or not");
   app.add_option("--samples", o.compile.settings.samples, "Samples drawn for a record");
-  app.add_option("--reduction", o.compile.settings.reduction,
-                 "Not with auto: merge components while the sum of Runnalls' costs stays below this; 0 keeps all");
+  app.add_option("--reduction", o.reduction,
+                 "Not with auto: merge components while the sum of Runnalls' costs stays below this; 0 keeps all")
+      ->default_str(fmt::format("{:g}", o.compile.settings.reduction));
   app.add_flag("--force", o.compile.force, "Fit again what is up to date");
   app.add_flag("--lenient", o.read.lenient, "Replace what the scene reader does not know, with a warning");
   app.add_flag("--json", o.json, "Print the table as JSON");
   addThreads(app, o.threads);
   addDefinitions(app, o.read.definitions);
+}
+
+/// Options that would have no effect are slips, too.
+void takeQualityAndReduction(Options& o) {
+  const bool isAuto = o.compile.settings.method == kMethodAuto;
+  if (o.reduction && isAuto)
+    throw UsageError("--reduction is not for --method auto, which chooses how many components");
+  if (o.quality && !isAuto) throw UsageError("--quality is for --method auto, the others fit what they are told to");
+  if (o.reduction) o.compile.settings.reduction = *o.reduction;
+  if (o.quality) o.compile.settings.quality = *o.quality;
 }
 
 void validate(const Options& o) {
@@ -60,11 +72,18 @@ double secondsToRun(const CompileJob& job, Progress& progress) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+/// Faults of files begin with the file's path.
+std::string withoutPath(const std::string& fault, const std::filesystem::path& path) {
+  const std::string start = path.string() + ": ";
+  return fault.starts_with(start) ? fault.substr(start.size()) : fault;
+}
+
 std::vector<CacheReport> compileAll(const std::vector<CompileJob>& jobs) {
   double directions = 0;
   for (const CompileJob& job : jobs) {
     if (!job.upToDate) directions += workOf(job);
-    if (!job.stale.empty()) fmt::print(stderr, "lobefit: {} is made again: {}\n", job.path.string(), job.stale);
+    if (!job.stale.empty())
+      fmt::print(stderr, "lobefit: {} is made again: {}\n", job.path.string(), withoutPath(job.stale, job.path));
   }
   Progress progress("fitting", directions);
   std::vector<CacheReport> reports(jobs.size());
@@ -116,6 +135,7 @@ void sayWhatMisses(const std::vector<CacheReport>& reports, const Options& o) {
 }
 
 void run(Options& o) {
+  takeQualityAndReduction(o);
   validate(o);
   std::optional<tbb::global_control> limit;
   if (o.threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(o.threads));

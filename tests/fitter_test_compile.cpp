@@ -191,6 +191,8 @@ TEST_CASE("fitter: tools refuse bad input with one line") {
                                                {"lobefit scene.xml --threads 0", 2},
                                                {"lobefit scene.xml -D roughness", 2},
                                                {"lobefit scene.xml --plot", 2},
+                                               {"lobefit scene.xml -D roughness=1 --reduction 0.1", 2},
+                                               {"lobefit scene.xml -D roughness=1 --method wem --quality 0.1", 2},
                                                {"lobefit scene.xml", 1},  // $roughness is not defined
                                                {"lobefit missing.xml", 1},
                                                {"lobefit broken.xml", 1},

@@ -317,6 +317,7 @@ TEST_CASE("loberender: --record says why there is nothing to draw") {
   CHECK_THAT(fault(folder, guided + " --record 0,0", 1), Catch::Contains("no surface that scatters light"));
   CHECK_THAT(fault(folder, guided + " --record 3", 2), Catch::Contains("'3' is not X,Y"));
   CHECK_THAT(fault(folder, guided + " --record 8,11 --record-image a.exr", 2), Catch::Contains("is written as .png"));
+  CHECK_THAT(fault(folder, guided + " --record-image a.png", 2), Catch::Contains("--record"));
   CHECK_THAT(fault(folder, "loberender scene.xml -o a.exr --spp 1 --integrator path --record 8,11", 2),
              Catch::Contains("path learns nothing"));
   // In the light of nothing no record is made.

@@ -42,7 +42,7 @@ void declare(CLI::App& app, Arguments& arguments) {
                   lobe::kMapLow, lobe::kMapHigh));
   auto* shrink =
       app.add_option("--shrink", arguments.shrink, "First average the reference over squares of so many pixels a side")
-          ->check(CLI::PositiveNumber);
+          ->check(CLI::Range(1, 1024));
   app.add_option("--merge", arguments.merge,
                  "Write the mean of the images, weighted by their numbers of samples, as an .exr; compare nothing")
       ->excludes(json)

@@ -85,10 +85,12 @@ void declare(CLI::App& app, Options& options) {
   app.add_option("--reference", job.reference, "Picture to measure the error against while rendering");
   app.add_option("--convergence", job.convergence, "CSV of that error over time");
   app.add_option("--stats", job.stats, "JSON file for the run's statistics");
-  app.add_option("--record", options.record,
-                 "X,Y: draw the illumination record that serves what this pixel shows (0,0 is top left)");
+  auto* record =
+      app.add_option("--record", options.record,
+                     "X,Y: draw the illumination record that serves what this pixel shows (0,0 is top left)");
   app.add_option("--record-image", job.recordImage,
                  "PNG for it: mixture, particles of the last pass and incident light over the disc of directions")
+      ->needs(record)
       ->capture_default_str();
   app.add_flag("--lenient", job.lenient, "Pass over what the reader does not know, with warnings");
   declareTraining(app, job);
