@@ -130,7 +130,8 @@ void setValue(const ReadContext& context, pugi::xml_node node, ParameterValue va
   const pugi::xml_attribute name = node.attribute("name");
   if (!name) context.file.fail(node, fmt::format("<{}> needs a name", node.name()));
   const std::string key = normalisedName(name.value());
-  if (parameters.contains(key)) context.file.fail(node, fmt::format("the parameter \"{}\" is given twice", name.value()));
+  if (parameters.contains(key))
+    context.file.fail(node, fmt::format("the parameter \"{}\" is given twice", name.value()));
   parameters.set(key, std::move(value), SceneFile::location(node));
 }
 

@@ -6,8 +6,8 @@ namespace lobe {
 
 /// What is kept of a component of weight π, mean (x, y) and covariance Σ = (xx, xy, yy). With its Cholesky factor,
 ///   π N(p) = scale · 2^(along dx² + across (dy − slope dx)²),  dx = p.x − x, dy = p.y − y,
-/// where slope = xy/xx and, with conditional d = |Σ|/xx, the variance of y at a given x, along = −kHalfLog2e/xx, across =
-/// −kHalfLog2e/d, scale = π/(2π sqrt|Σ|). All but xx, xy, yy and weight are what the density needs.
+/// where slope = xy/xx and, with conditional d = |Σ|/xx, the variance of y at a given x, along = −kHalfLog2e/xx, across
+/// = −kHalfLog2e/d, scale = π/(2π sqrt|Σ|). All but xx, xy, yy and weight are what the density needs.
 enum class LaneField { x, y, slope, along, across, scale, xx, xy, conditional, weight, yy };
 inline constexpr int kLaneFields = 11;
 

@@ -20,8 +20,8 @@ std::map<std::string, TrainFrom> trainFromNames();
 struct TrainingPlan {
   TrainFrom from = TrainFrom::both;
   int passes = 8;
-  int photons = 300000;        ///< a pass; none are traced for TrainFrom::paths
-  int importons = 100000;      ///< a pass
+  int photons = 300000;    ///< a pass; none are traced for TrainFrom::paths
+  int importons = 100000;  ///< a pass
   /// Passes end by then, as far as can be foreseen: they begin small and double. Results depend on the machine's speed.
   double seconds = kInfinity;
   std::uint64_t seed = 1;
@@ -55,8 +55,10 @@ struct TrainedIllumination {
   std::array<std::vector<Particle>, 2> particles;
 };
 
-/// caches: for the product; nullptr: paths in training are guided by illumination only. afterPass: called with what each pass did.
+/// caches: for the product; nullptr: paths in training are guided by illumination only. afterPass: called with what
+/// each pass did.
 TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera& camera, const BrdfCaches* caches,
-                                      const TrainingPlan& plan, const std::function<void(const PassReport&)>& afterPass = {});
+                                      const TrainingPlan& plan,
+                                      const std::function<void(const PassReport&)>& afterPass = {});
 
 }  // namespace lobe
