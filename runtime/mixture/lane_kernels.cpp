@@ -27,7 +27,7 @@ HWY_INLINE hn::Vec<D> pairColumns(D d, LanesView reflectance, float constant, La
   const auto scale2 = hn::Mul(weight2, hn::Set(d, 0.5f * std::numbers::inv_pi_v<float>));
   const auto variance2 = two(LaneField::conditional);
   auto sum = hn::Mul(hn::Set(d, constant), weight2);
-  hn::StoreU(sum, d, pairs + reflectance.count * light.stride + first);
+  hn::StoreU(sum, d, pairs + std::ptrdiff_t{reflectance.count} * light.stride + first);
   for (int i = 0; i < reflectance.count; ++i) {
     const auto one = [&](LaneField f) { return hn::Set(d, reflectance.field(f)[i]); };
     const auto xx1 = one(LaneField::xx);
@@ -42,7 +42,7 @@ HWY_INLINE hn::Vec<D> pairColumns(D d, LanesView reflectance, float constant, La
     const auto square = hn::Mul(reciprocal(d, sxx), hn::MulAdd(lean, lean, hn::Mul(dx, dx)));
     const auto weight = hn::Mul(hn::Mul(hn::Set(d, reflectance.field(LaneField::weight)[i]), height), scale2);
     const auto mass = hn::Mul(weight, exp2Negative(d, hn::Mul(hn::Set(d, -kHalfLog2e), square)));
-    hn::StoreU(mass, d, pairs + i * light.stride + first);
+    hn::StoreU(mass, d, pairs + std::ptrdiff_t{i} * light.stride + first);
     sum = hn::Add(sum, mass);
   }
   return sum;
@@ -71,14 +71,15 @@ HWY_INLINE float pairMassesBy(D d, LanesView reflectance, float constant, LanesV
   return sumUp(columns, light.stride);
 }
 
-float PairMasses(const LanesView& reflectance, float constant, const LanesView& light, float* pairs, float* columns) {
+float pairMassesKernel(const LanesView& reflectance, float constant, const LanesView& light, float* pairs,
+                       float* columns) {
   if (light.stride == kLaneStep)
     return pairMassesBy(hn::CappedTag<float, kLaneStep>(), reflectance, constant, light, pairs, columns);
   return pairMassesBy(hn::CappedTag<float, kMostLanes>(), reflectance, constant, light, pairs, columns);
 }
 
 // Without branches that depend on chance: the machine would guess them wrong.
-PairIndex ChoosePair(const float* pairs, const float* columns, int rows, int stride, float choice) {
+PairIndex choosePairKernel(const float* pairs, const float* columns, int rows, int stride, float choice) {
   const hn::CappedTag<float, kLaneStep> d;
   float left = choice * columns[stride - 1];  // less than all
   int column = 0;
@@ -89,11 +90,11 @@ PairIndex ChoosePair(const float* pairs, const float* columns, int rows, int str
   float sum = 0;
   int row = 0;
   for (int i = 0; i < rows; ++i) {
-    sum += masses[i * stride];
+    sum += masses[std::ptrdiff_t{i} * stride];
     row += sum <= left ? 1 : 0;
   }
   // Rounding may leave a little at the end: then the last pair that has mass is taken.
-  while (row == rows || !(masses[row * stride] > 0)) --row;
+  while (row == rows || !(masses[std::ptrdiff_t{row} * stride] > 0)) --row;
   return {row, column};
 }
 
@@ -138,11 +139,11 @@ HWY_INLINE float reflectanceDensityAt(const LanesView& reflectance, float x, flo
   return reflectanceDensityBy(hn::CappedTag<float, kMostLanes>(), reflectance, x, y);
 }
 
-float LightDensity(const LanesView& light, float x, float y) {
+float lightDensityKernel(const LanesView& light, float x, float y) {
   return lightDensityAt(light, x, y);
 }
 
-Densities BothDensities(const LanesView& reflectance, const LanesView& light, float x, float y) {
+Densities bothDensitiesKernel(const LanesView& reflectance, const LanesView& light, float x, float y) {
   return {reflectanceDensityAt(reflectance, x, y), lightDensityAt(light, x, y)};
 }
 
@@ -173,7 +174,7 @@ HWY_INLINE void placeBy(D d, LanesView mixture, const Placement& p, float* out, 
   for (int k = 0; k < mixture.count; k += static_cast<int>(hn::Lanes(d))) {
     const auto from = [&](LaneField f) { return hn::LoadU(d, mixture.field(f) + k); };
     const auto to = [&](LaneField f, hn::Vec<D> v) {
-      hn::StoreU(v, d, out + static_cast<int>(f) * stride + first + k);
+      hn::StoreU(v, d, out + static_cast<std::ptrdiff_t>(f) * stride + first + k);
     };
     const auto oldX = hn::Mul(hn::Set(d, p.mirrorX), from(LaneField::x)),
                oldY = hn::Mul(hn::Set(d, p.mirrorY), from(LaneField::y));
@@ -202,7 +203,8 @@ HWY_INLINE void placeBy(D d, LanesView mixture, const Placement& p, float* out, 
   }
 }
 
-void PlaceMixture(const LanesView& mixture, const Placement& placement, float* out, int stride, int first) {
+void placeMixtureKernel(const LanesView& mixture, const Placement& placement, float* out, int stride, int first) {
+  // NOLINTNEXTLINE(bugprone-branch-clone): they are the same only for targets of four lanes
   if (mixture.count <= kLaneStep)
     placeBy(hn::CappedTag<float, kLaneStep>(), mixture, placement, out, stride, first);
   else
@@ -216,31 +218,31 @@ HWY_AFTER_NAMESPACE();
 namespace lobe {
 
 namespace {
-HWY_EXPORT(PairMasses);
-HWY_EXPORT(ChoosePair);
-HWY_EXPORT(LightDensity);
-HWY_EXPORT(BothDensities);
-HWY_EXPORT(PlaceMixture);
+HWY_EXPORT(pairMassesKernel);
+HWY_EXPORT(choosePairKernel);
+HWY_EXPORT(lightDensityKernel);
+HWY_EXPORT(bothDensitiesKernel);
+HWY_EXPORT(placeMixtureKernel);
 }  // namespace
 
 float pairMasses(const LanesView& reflectance, float constant, const LanesView& light, float* pairs, float* columns) {
-  return HWY_DYNAMIC_DISPATCH(PairMasses)(reflectance, constant, light, pairs, columns);
+  return HWY_DYNAMIC_DISPATCH(pairMassesKernel)(reflectance, constant, light, pairs, columns);
 }
 
 PairIndex choosePair(const float* pairs, const float* columns, int rows, int stride, float choice) {
-  return HWY_DYNAMIC_DISPATCH(ChoosePair)(pairs, columns, rows, stride, choice);
+  return HWY_DYNAMIC_DISPATCH(choosePairKernel)(pairs, columns, rows, stride, choice);
 }
 
 float lightDensity(const LanesView& light, float x, float y) {
-  return HWY_DYNAMIC_DISPATCH(LightDensity)(light, x, y);
+  return HWY_DYNAMIC_DISPATCH(lightDensityKernel)(light, x, y);
 }
 
 Densities densities(const LanesView& reflectance, const LanesView& light, float x, float y) {
-  return HWY_DYNAMIC_DISPATCH(BothDensities)(reflectance, light, x, y);
+  return HWY_DYNAMIC_DISPATCH(bothDensitiesKernel)(reflectance, light, x, y);
 }
 
 void placeMixture(const LanesView& mixture, const Placement& placement, float* out, int stride, int first) {
-  HWY_DYNAMIC_DISPATCH(PlaceMixture)(mixture, placement, out, stride, first);
+  HWY_DYNAMIC_DISPATCH(placeMixtureKernel)(mixture, placement, out, stride, first);
 }
 
 std::vector<std::int64_t> kernelTargets() {

@@ -2,6 +2,8 @@
 // Gaussians side by side: a field of all components is one run of floats, so that one load feeds one set of lanes. No
 // Eigen in here: the kernels are compiled for several instruction sets.
 
+#include <cstddef>
+
 namespace lobe {
 
 /// What is kept of a component of weight π, mean (x, y) and covariance Σ = (xx, xy, yy). With its Cholesky factor,
@@ -28,7 +30,7 @@ struct LanesView {
   int stride;
   int count;
 
-  const float* field(LaneField f) const { return data + static_cast<int>(f) * stride; }
+  const float* field(LaneField f) const { return data + static_cast<std::ptrdiff_t>(f) * stride; }
 };
 
 }  // namespace lobe

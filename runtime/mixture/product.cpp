@@ -9,7 +9,7 @@ namespace {
 
 /// (cos 2πu, sin 2πu) for u in [0,1), to 2e-7. Without branches that depend on u, which the machine would guess wrong.
 Vec2 onCircle(float u) {
-  const int quarter = static_cast<int>(4.0f * u + 0.5f);
+  const int quarter = static_cast<int>(4.0f * (u + 0.125f));
   const float t = 2.0f * std::numbers::pi_v<float> * (u - 0.25f * static_cast<float>(quarter)), t2 = t * t;
   // Taylor on |t| ≤ π/4.
   const float sine = t * (1.0f + t2 * (-1.0f / 6 + t2 * (1.0f / 120 + t2 * (-1.0f / 5040 + t2 * (1.0f / 362880)))));

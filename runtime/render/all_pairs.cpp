@@ -20,7 +20,8 @@ HWY_INLINE hn::Vec<D> formRow(D d, const LanesView& reflectance, int i, const La
   const auto one = [&](LaneField f) { return hn::Set(d, reflectance.field(f)[i]); };
   const auto two = [&](LaneField f) { return hn::LoadU(d, light.field(f) + first); };
   const auto to = [&](LaneField f, hn::Vec<D> v) {
-    hn::StoreU(v, d, out + static_cast<int>(f) * AllPairs::kMostPairs + i * light.stride + first);
+    hn::StoreU(v, d,
+               out + static_cast<std::ptrdiff_t>(f) * AllPairs::kMostPairs + std::ptrdiff_t{i} * light.stride + first);
   };
   const auto half = hn::Set(d, -kHalfLog2e);
   const auto xx1 = one(LaneField::xx), xx2 = two(LaneField::xx);
@@ -70,7 +71,9 @@ HWY_INLINE float sumBy(D d, const float* pairs, int count, float px, float py) {
   const auto x = hn::Set(d, px), y = hn::Set(d, py);
   auto total = hn::Zero(d);
   for (int k = 0; k < count; k += static_cast<int>(hn::Lanes(d))) {
-    const auto at = [&](LaneField f) { return hn::LoadU(d, pairs + static_cast<int>(f) * AllPairs::kMostPairs + k); };
+    const auto at = [&](LaneField f) {
+      return hn::LoadU(d, pairs + static_cast<std::ptrdiff_t>(f) * AllPairs::kMostPairs + k);
+    };
     const auto dx = hn::Sub(x, at(LaneField::x));
     const auto dy = hn::NegMulAdd(at(LaneField::slope), dx, hn::Sub(y, at(LaneField::y)));
     const auto exponent =
@@ -80,12 +83,12 @@ HWY_INLINE float sumBy(D d, const float* pairs, int count, float px, float py) {
   return hn::GetLane(hn::SumOfLanes(d, total));
 }
 
-float Form(const LanesView& reflectance, const LanesView& light, int lanes, float* out) {
+float formKernel(const LanesView& reflectance, const LanesView& light, int lanes, float* out) {
   if (lanes == kLaneStep) return formBy(hn::CappedTag<float, kLaneStep>(), reflectance, light, out);
   return formBy(hn::CappedTag<float, kMostLanes>(), reflectance, light, out);
 }
 
-float Sum(const float* pairs, int count, int lanes, float x, float y) {
+float sumKernel(const float* pairs, int count, int lanes, float x, float y) {
   if (lanes == kLaneStep) return sumBy(hn::CappedTag<float, kLaneStep>(), pairs, count, x, y);
   return sumBy(hn::CappedTag<float, kMostLanes>(), pairs, count, x, y);
 }
@@ -97,13 +100,13 @@ HWY_AFTER_NAMESPACE();
 namespace lobe {
 
 namespace {
-HWY_EXPORT(Form);
-HWY_EXPORT(Sum);
+HWY_EXPORT(formKernel);
+HWY_EXPORT(sumKernel);
 }  // namespace
 
 AllPairs::AllPairs(const LanesView& reflectance, const LanesView& light, int lanes)
     : lanes_(lanes),
-      mass_(HWY_DYNAMIC_DISPATCH(Form)(reflectance, light, lanes, pairs_.data())),
+      mass_(HWY_DYNAMIC_DISPATCH(formKernel)(reflectance, light, lanes, pairs_.data())),
       count_(reflectance.count * light.stride) {}
 
 Vec2 AllPairs::sample(float choice, const Vec2& u) const {
@@ -116,7 +119,7 @@ Vec2 AllPairs::sample(float choice, const Vec2& u) const {
 }
 
 float AllPairs::pdf(const Vec2& y) const {
-  return HWY_DYNAMIC_DISPATCH(Sum)(pairs_.data(), count_, lanes_, y.x(), y.y()) / mass_;
+  return HWY_DYNAMIC_DISPATCH(sumKernel)(pairs_.data(), count_, lanes_, y.x(), y.y()) / mass_;
 }
 
 }  // namespace lobe
