@@ -1,5 +1,5 @@
 #pragma once
-// Tells scenes apart by their light.
+// Tells scenes apart by their light, and by the picture they make.
 
 #include <cstdint>
 
