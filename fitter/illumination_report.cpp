@@ -45,6 +45,7 @@ std::vector<Distribution> distributions(const IlluminationFile& file) {
   return {distributionOf(file, "radius", [](const auto& r) { return r.radius; }),
           distributionOf(file, "samples", [](const auto& r) { return r.samples; }),
           distributionOf(file, "background", [](const auto& r) { return r.background; }),
+          distributionOf(file, "BSDF share", [](const auto& r) { return r.bsdfShare; }),
           distributionOf(file, "irradiance", [](const auto& r) { return r.irradiance; }),
           distributionOf(file, "components", [](const auto& r) { return r.count; })};
 }
@@ -54,10 +55,15 @@ Json vectorJson(const std::array<float, 3>& v) {
 }
 
 Json recordJson(const IlluminationFile& file, const StoredIllumination& r) {
-  Json json{{"position", vectorJson(r.position)},      {"normal", vectorJson(r.normal)},
-            {"tangent", vectorJson(r.tangent)},        {"radius", shortNumber(r.radius)},
-            {"background", shortNumber(r.background)}, {"irradiance", shortNumber(r.irradiance)},
-            {"samples", shortNumber(r.samples)},       {"components", Json::array()}};
+  Json json{{"position", vectorJson(r.position)},
+            {"normal", vectorJson(r.normal)},
+            {"tangent", vectorJson(r.tangent)},
+            {"radius", shortNumber(r.radius)},
+            {"background", shortNumber(r.background)},
+            {"irradiance", shortNumber(r.irradiance)},
+            {"samples", shortNumber(r.samples)},
+            {"bsdf_share", shortNumber(r.bsdfShare)},
+            {"components", Json::array()}};
   for (const CacheComponent& c : file.components(r)) json["components"].push_back(componentJson(c));
   return json;
 }

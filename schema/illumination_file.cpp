@@ -40,6 +40,7 @@ void checkRecord(const StoredIllumination& r, std::size_t index, std::span<const
   require(r.background >= 0 && r.background <= 1, "share of the background out of range");
   require(r.irradiance >= 0, "a negative irradiance");
   require(r.samples >= 0, "a negative number of samples");
+  require(r.bsdfShare > 0 && r.bsdfShare <= 1, "share of the BSDF out of range");
   require(r.count <= kMaxStoredComponents, "number of components out of range");
   require(componentsInRange(r.first, r.count, components), "components out of range");
   require(r.count == 0 || weightsSumToOne(components.subspan(r.first, r.count)), "the weights do not sum to one");

@@ -13,13 +13,13 @@
 
 namespace lobe {
 
-inline constexpr FileFormat kIlluminationFormat{{'I', 'L', 'L', 'U'}, 1, 0};
+inline constexpr FileFormat kIlluminationFormat{{'I', 'L', 'L', 'U'}, 2, 0};
 
 /// Read in place: the layout is the schema's (checked when compiled, the order of the fields by a test). A new field
 /// goes here, into illumination.fbs, the checks of illumination_file.cpp and runtime/guiding/illumination_store.cpp.
 struct StoredIllumination {
   std::array<float, 3> position, normal, tangent;
-  float radius, background, irradiance, samples;
+  float radius, background, irradiance, samples, bsdfShare;
   std::uint32_t first, count;
 };
 

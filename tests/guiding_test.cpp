@@ -56,7 +56,7 @@ const IlluminationRecord* bruteForce(std::span<const IlluminationRecord> records
   float bestCost = 1e30f;
   for (const IlluminationRecord& r : records) {
     const float distance = (x - r.position).norm();
-    if (distance > r.radius || n.dot(r.normal) < 0.75f) continue;
+    if (distance > r.radius || n.dot(r.normal) < 0.97f) continue;
     const float cost = distance / unit + 2 * std::sqrt(std::max(0.0f, 1.001f - n.dot(r.normal)));
     if (cost < bestCost) {
       bestCost = cost;
@@ -102,11 +102,15 @@ TEST_CASE("guiding: the look-up finds the best valid record") {
   const IlluminationCache cache(records, unit);
   int found = 0;
   for (int i = 0; i < 5000; ++i) {
-    const Vec3 x = randomPoint(rng) * 1.2f - Vec3::Constant(0.1f);
-    const Vec3 n = randomDirection(rng);
+    Vec3 x = randomPoint(rng) * 1.2f - Vec3::Constant(0.1f), n = randomDirection(rng);
+    if (i % 2 == 0) {  // most normals of the others find none
+      const IlluminationRecord& near = records[static_cast<std::size_t>(i) % records.size()];
+      x = near.position + 0.3f * unit * randomDirection(rng);
+      n = (near.normal + 0.3f * n).normalized();
+    }
     const IlluminationRecord* expected = bruteForce(records, x, n, unit);
     const PackedRecord* record = cache.find(x, n);
-    REQUIRE((record ? &records[record->index] : nullptr) == expected);
+    REQUIRE((record ? &records[cache.indexOf(*record)] : nullptr) == expected);
     found += expected != nullptr;
   }
   CHECK(found > 500);
@@ -120,6 +124,7 @@ TEST_CASE("guiding: records come back as they were given, and few Gaussians take
     records.push_back(recordAt(randomPoint(rng), randomDirection(rng), 0.1f + rng.uniform()));
     records.back().count = count;
     records.back().irradiance = rng.uniform();
+    records.back().bsdfShare = rng.uniform();
     for (Gaussian& g : records.back().components)
       g = {rng.uniform(), rng.uniform(), rng.uniform(), {0.1f + rng.uniform(), 0.1f * rng.uniform(), 0.1f}};
   }
@@ -131,6 +136,7 @@ TEST_CASE("guiding: records come back as they were given, and few Gaussians take
     CHECK((a.position == b.position && a.normal == b.normal && a.tangent == b.tangent && a.radius == b.radius));
     CHECK(
         (a.background == b.background && a.irradiance == b.irradiance && a.samples == b.samples && a.count == b.count));
+    CHECK(a.bsdfShare == b.bsdfShare);
     const auto bytes = static_cast<std::size_t>(a.count) * sizeof(Gaussian);
     CHECK(std::memcmp(a.components.data(), b.components.data(), bytes) == 0);
   }

@@ -47,7 +47,7 @@ TEST_CASE("unbiased: samples of trained records and fitted lobes have the densit
     const IlluminationCache alone({record}, studio.illumination().unit());
     const PackedRecord& packed = *alone.find(record.position, record.normal);
     for (std::size_t j = 0; j < reflectances.size(); ++j) {
-      const GuidedDensity density(reflectances[j], packed, kProductShares);
+      const GuidedDensity density(reflectances[j], packed, productShares(packed.bsdfShare));
       const Chi2Result result = ofMixtures(density, i * kReflectances + j, kFew);
       INFO("record " << i << ", reflectance " << j << ": " << result.message);
       CHECK(result.passed(kRecords * kReflectances));

@@ -9,13 +9,37 @@
 namespace lobe {
 namespace {
 
-constexpr float kMinNormalCosine = 0.75f;  // about 41°
+constexpr float kMinNormalCosine = 0.97f;  // about 14°
 // Cells of the largest radius: a record lies in few of them, and a cell holds few records.
 constexpr float kCellsPerUnit = 0.5f;
 constexpr float kRounding = 1e-3f;  // of a cell: a point may be found in the cell next to its own
 
 Eigen::Vector3i cellOf(const Vec3& x, float inverseCellSize) {
   return (x * inverseCellSize).array().floor().cast<int>();
+}
+
+/// Cells hold what faces one side each: that of the cube of directions which the normal points at.
+enum Side : std::uint8_t { kSides = 6 };
+
+Side sideOf(const Vec3& n) {
+  Eigen::Index axis;
+  n.cwiseAbs().maxCoeff(&axis);
+  return static_cast<Side>(2 * axis + (n[axis] < 0));
+}
+
+/// Whether a normal that points at this side may ask for a record of normal n.
+bool mayServe(const Vec3& n, Side side) {
+  // A chord of the allowed angle moves the difference of two coordinates by √2 of its length at most.
+  const float most = std::sqrt(2 * 2 * (1 - kMinNormalCosine)) + kRounding;
+  const float along = side % 2 == 0 ? n[side / 2] : -n[side / 2];
+  return along + most >= n.cwiseAbs().maxCoeff();
+}
+
+std::uint64_t cellKey(const Eigen::Vector3i& cell, Side side) {
+  // 20 bits an axis: scenes of a million cells across, beyond which keys wrap and cells are shared, which is harmless.
+  constexpr std::uint64_t mask = (1u << 20) - 1;
+  return (static_cast<std::uint64_t>(cell.x()) & mask) | (static_cast<std::uint64_t>(cell.y()) & mask) << 20 |
+         (static_cast<std::uint64_t>(cell.z()) & mask) << 40 | static_cast<std::uint64_t>(side) << 60;
 }
 
 std::size_t slotOf(std::uint64_t key, std::size_t tableSize) {
@@ -67,7 +91,10 @@ std::vector<IlluminationCache::Placement> IlluminationCache::placeInCells() cons
         for (int x = low.x(); x <= high.x(); ++x) {
           const Vec3 corner(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z));
           const Eigen::AlignedBox3f cell(corner, corner + Vec3::Ones());
-          if (cell.squaredExteriorDistance(centre) <= radius * radius) placements.push_back({cellKey({x, y, z}), i});
+          if (cell.squaredExteriorDistance(centre) > radius * radius) continue;
+          for (int side = 0; side < kSides; ++side)
+            if (mayServe(r.normal, static_cast<Side>(side)))
+              placements.push_back({cellKey({x, y, z}, static_cast<Side>(side)), i});
         }
   }
   std::ranges::sort(placements, {}, [](const Placement& p) { return std::pair(p.key, p.record); });
@@ -78,7 +105,6 @@ void IlluminationCache::pack(const IlluminationRecord& record) {
   static_assert(sizeof(PackedRecord) == sizeof(Block) && kMaxLightComponents == 8);
   const int stride = record.count <= kLaneStep ? kLaneStep : kMaxLightComponents;
   const std::size_t first = blocks_.size();
-  const auto index = static_cast<std::uint32_t>(places_.size());
   places_.push_back({record.position, record.normal, record.radius, static_cast<std::uint32_t>(first)});
   constexpr std::size_t kBlockFloats = sizeof(Block) / sizeof(float);
   const std::size_t floats = static_cast<std::size_t>(stride) * kLaneFields;
@@ -87,14 +113,19 @@ void IlluminationCache::pack(const IlluminationRecord& record) {
                                      .background = record.background,
                                      .irradiance = record.irradiance,
                                      .samples = record.samples,
+                                     .bsdfShare = record.bsdfShare,
                                      .count = static_cast<std::uint16_t>(record.count),
-                                     .stride = static_cast<std::uint16_t>(stride),
-                                     .index = index};
+                                     .stride = static_cast<std::uint16_t>(stride)};
   packLanes(record.gaussians(), blocks_[first + 1].floats.data(), stride);
 }
 
+std::size_t IlluminationCache::indexOf(const PackedRecord& record) const {
+  const auto block = static_cast<std::uint32_t>(reinterpret_cast<const Block*>(&record) - blocks_.data());
+  return static_cast<std::size_t>(std::ranges::lower_bound(places_, block, {}, &Place::block) - places_.begin());
+}
+
 IlluminationRecord IlluminationCache::unpacked(const PackedRecord& record) const {
-  const Place& place = places_[record.index];
+  const Place& place = places_[indexOf(record)];
   IlluminationRecord r{.position = place.position,
                        .normal = place.normal,
                        .tangent = record.tangent,
@@ -102,6 +133,7 @@ IlluminationRecord IlluminationCache::unpacked(const PackedRecord& record) const
                        .background = record.background,
                        .irradiance = record.irradiance,
                        .samples = record.samples,
+                       .bsdfShare = record.bsdfShare,
                        .count = record.count,
                        .components = {}};
   std::ranges::copy(unpackLanes(record.lanes()), r.components.begin());
@@ -132,13 +164,6 @@ IlluminationCache reduced(const IlluminationCache& cache, float threshold) {
   return {records, cache.unit()};
 }
 
-std::uint64_t IlluminationCache::cellKey(const Eigen::Vector3i& cell) const {
-  // 21 bits an axis: scenes of a million cells across, beyond which keys wrap and cells are shared, which is harmless.
-  constexpr std::uint64_t mask = (1u << 21) - 1;
-  return (static_cast<std::uint64_t>(cell.x()) & mask) | (static_cast<std::uint64_t>(cell.y()) & mask) << 21 |
-         (static_cast<std::uint64_t>(cell.z()) & mask) << 42;
-}
-
 const IlluminationCache::Cell* IlluminationCache::findCell(std::uint64_t key) const {
   if (table_.empty()) return nullptr;
   for (std::size_t slot = slotOf(key, table_.size());; slot = (slot + 1) & (table_.size() - 1)) {
@@ -149,7 +174,7 @@ const IlluminationCache::Cell* IlluminationCache::findCell(std::uint64_t key) co
 }
 
 const PackedRecord* IlluminationCache::find(const Vec3& x, const Vec3& n) const {
-  const Cell* cell = findCell(cellKey(cellOf(x, inverseCellSize_)));
+  const Cell* cell = findCell(cellKey(cellOf(x, inverseCellSize_), sideOf(n)));
   if (!cell) return nullptr;
   const Entry* best = nullptr;
   float bestCost = std::numeric_limits<float>::infinity();

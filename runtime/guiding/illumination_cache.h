@@ -24,6 +24,7 @@ struct IlluminationRecord {
   float background;  ///< u in [0,1]
   float irradiance;  ///< ∫ L cosθ, from all light, in units that are the same for all records; 0: not known
   float samples;     ///< particles seen in training
+  float bsdfShare;   ///< of the BSDF in the product's density, see SelectionShare
   std::int32_t count = 0;
   std::array<Gaussian, kMaxLightComponents> components;  ///< weights sum to 1
 
@@ -36,9 +37,9 @@ struct alignas(32) PackedRecord {
   float background;
   float irradiance;
   float samples;
+  float bsdfShare;
   std::uint16_t count;   ///< Gaussians
   std::uint16_t stride;  ///< 4 or 8 lanes
-  std::uint32_t index;   ///< of the record, as it was given
 
   LanesView lanes() const { return {reinterpret_cast<const float*>(this + 1), stride, count}; }
 };
@@ -49,11 +50,13 @@ class IlluminationCache {
   /// unit: the length that radii are clamped to (see TrainingOptions), > 0.
   IlluminationCache(const std::vector<IlluminationRecord>& records, float unit);
 
-  /// The valid record of least |x−x_j|/unit + 2 sqrt(1.001 − n·n_j): within its radius and about 41° of its normal. n
+  /// The valid record of least |x−x_j|/unit + 2 sqrt(1.001 − n·n_j): within its radius and about 14° of its normal. n
   /// is the unit geometric normal on the side asked for. nullptr: none, the BSDF is to be sampled.
   const PackedRecord* find(const Vec3& x, const Vec3& n) const;
 
   std::size_t size() const { return places_.size(); }
+  /// The place of a record of this cache in the order that they were given in.
+  std::size_t indexOf(const PackedRecord& record) const;
   /// A record of this cache as it was given, to the bit.
   IlluminationRecord unpacked(const PackedRecord& record) const;
   /// All records as they were given.
@@ -85,17 +88,16 @@ class IlluminationCache {
     std::array<float, 8> floats;
   };
   struct Placement {
-    std::uint64_t key;  // of the cell
+    std::uint64_t key;  // of the cell and side
     std::uint32_t record;
   };
   void pack(const IlluminationRecord& record);
-  /// Every record in every cell that it reaches into, ordered by cells.
+  /// Every record in every cell that it reaches into, on every side that it may be asked for, ordered by both.
   std::vector<Placement> placeInCells() const;
   const PackedRecord& at(std::uint32_t block) const { return reinterpret_cast<const PackedRecord&>(blocks_[block]); }
-  std::uint64_t cellKey(const Eigen::Vector3i& cell) const;
   const Cell* findCell(std::uint64_t key) const;
 
-  std::vector<Place> places_;
+  std::vector<Place> places_;  // ordered by block
   std::vector<Block> blocks_;  // records, each of as many blocks as it needs
   float unit_ = 1;
   float inverseCellSize_ = 1;

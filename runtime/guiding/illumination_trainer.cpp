@@ -101,6 +101,12 @@ void IlluminationTrainer::fill(std::span<const std::span<const Particle>> source
   if (!neighbours.empty()) makeRecords(neighbours, requests);
 }
 
+void IlluminationTrainer::learnShares(std::span<const ShareSample> samples) {
+  std::vector<std::vector<ShareSample>> ofRecord(records_.size());
+  for (const ShareSample& s : samples) ofRecord[cache_.indexOf(*s.record)].push_back(s);
+  tbb::parallel_for(std::size_t{0}, records_.size(), [&](std::size_t i) { records_[i].share.learn(ofRecord[i]); });
+}
+
 std::optional<double> IlluminationTrainer::updateAll(const ParticleNeighbours& neighbours) {
   constexpr double none = std::numeric_limits<double>::quiet_NaN();
   std::vector<double> likelihoods(records_.size(), none);
@@ -152,8 +158,15 @@ std::optional<IlluminationTrainer::Training> IlluminationTrainer::makeRecord(con
   const Vec3 tangent = request.normal.unitOrthogonal();
   const Neighbourhood found = neighbours.around(request.position, request.normal, tangent);
   if (found.points.empty()) return std::nullopt;
-  Training record{request.position, request.normal,   tangent, std::clamp(found.radius, 0.1f * unit_, unit_),
-                  found.distance,   found.irradiance, 1,       StepwiseEm(options_.components, options_.em)};
+  Training record{request.position,
+                  request.normal,
+                  tangent,
+                  std::clamp(found.radius, 0.1f * unit_, unit_),
+                  found.distance,
+                  found.irradiance,
+                  1,
+                  StepwiseEm(options_.components, options_.em),
+                  {}};
   record.em.fit(found.points);
   shrinkRadius(record);
   return record;
@@ -186,6 +199,7 @@ void IlluminationTrainer::rebuildCache() {
     r.background = t.em.background();
     r.irradiance = t.irradiance;
     r.samples = static_cast<float>(t.em.samplesSeen());
+    r.bsdfShare = t.share.bsdf();
     r.count = static_cast<std::int32_t>(t.em.gaussians().size());
     std::ranges::copy(t.em.gaussians(), r.components.begin());
   }

@@ -10,6 +10,7 @@
 
 #include "runtime/guiding/illumination_cache.h"
 #include "runtime/guiding/particle_neighbours.h"
+#include "runtime/guiding/selection_share.h"
 #include "runtime/mixture/em.h"
 
 namespace lobe {
@@ -37,6 +38,9 @@ class IlluminationTrainer {
   std::optional<double> learn(std::span<const std::span<const Particle>> sources,
                               std::span<const RecordRequest> requests);
 
+  /// Learns the records' shares of the BSDF. The samples are of records in cache() as it is.
+  void learnShares(std::span<const ShareSample> samples);
+
   /// Makes records for requests that none serves from particles that the others have already learnt from.
   void fill(std::span<const std::span<const Particle>> sources, std::span<const RecordRequest> requests);
 
@@ -55,6 +59,7 @@ class IlluminationTrainer {
     float irradiance;  // mean over the passes since it was made
     int passes;
     StepwiseEm em;
+    SelectionShare share;
   };
 
   std::optional<double> updateAll(const ParticleNeighbours& neighbours);

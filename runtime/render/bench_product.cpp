@@ -72,6 +72,7 @@ class Lights {
                            .background = 0.3f,
                            .irradiance = 0,
                            .samples = 1000,
+                           .bsdfShare = 0.2f,
                            .count = components,
                            .components = {}};
       for (int k = 0; k < components; ++k)

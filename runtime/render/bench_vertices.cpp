@@ -85,12 +85,20 @@ struct ReducedFactors {
   GuidedSampler sampler;
 };
 
+/// The records without the shares that they have learnt.
+IlluminationCache withFixedShares(const IlluminationCache& cache) {
+  std::vector<IlluminationRecord> records = cache.records();
+  for (IlluminationRecord& r : records) r.bsdfShare = kProductShares.bsdf;
+  return {records, cache.unit()};
+}
+
 /// All that vertices are examined with.
 struct Laboratory {
   const RenderScene& scene;
   const Integrator& paths;
   const GuidedSampler& guided;
   const GuidedSampler& product;
+  const GuidedSampler& fixedShares;
   const Options& options;
 };
 
@@ -186,9 +194,11 @@ double leastAt(const std::function<double(double)>& function, double low, double
   return 0.5 * (low + high);
 }
 
-/// The densities of which the NEVs are reported, before those of reduced mixtures. Shares of the BSDF against the
-/// mixtures are the product's own, or the best for each vertex: by Kullback–Leibler divergence, or by the NEV itself.
-constexpr std::array kDensityNames{"bsdf", "guided", "product", "product_share_by_kl", "product_share_by_nev"};
+/// The densities of which the NEVs are reported, before those of reduced mixtures. The product's shares of the BSDF
+/// against the mixtures are those that its records have learnt, one for all records, or the best for each vertex: by
+/// Kullback–Leibler divergence, or by the NEV itself.
+constexpr std::array kDensityNames{
+    "bsdf", "guided", "product", "product_fixed_shares", "product_share_by_kl", "product_share_by_nev"};
 
 /// What is found at one vertex.
 struct Grade {
@@ -243,14 +253,14 @@ Grade gradeVertex(const Laboratory& lab, const std::deque<ReducedFactors>& reduc
   Grade grade{.decision = product.decision(), .nevs = {}, .share = product.bsdfShare(), .bestShare = 1};
   const auto bsdf = light.nev([&](const Vec3& wi) { return hit.bsdf->pdf(hit.wo, wi, hit.uv); });
   if (!bsdf) return grade;
-  grade.nevs = {*bsdf, *nev(lab.guided), *nev(lab.product)};
+  grade.nevs = {*bsdf, *nev(lab.guided), *nev(lab.product), *nev(lab.fixedShares)};
   if (grade.share < 1) {
     const Reshared reshared(product, hit, light);
     grade.bestShare = reshared.shareByNev();
     grade.nevs.push_back(*reshared.nev(reshared.shareByKl()));
     grade.nevs.push_back(*reshared.nev(grade.bestShare));
   } else {
-    grade.nevs.insert(grade.nevs.end(), 2, grade.nevs.back());
+    grade.nevs.insert(grade.nevs.end(), 2, grade.nevs[2]);
   }
   for (const ReducedFactors& r : reductions) grade.nevs.push_back(*nev(r.sampler));
   return grade;
@@ -316,9 +326,11 @@ void run(Options& o) {
   std::deque<ReducedFactors> reductions;
   for (const double threshold : o.reductions) reductions.emplace_back(o, scene, trained.cache, threshold);
   const GuidedSampler guided(scene, trained.cache, nullptr), product(scene, trained.cache, &caches);
+  const IlluminationCache withoutShares = withFixedShares(trained.cache);
+  const GuidedSampler fixedShares(scene, withoutShares, &caches);
   const GuidedIntegrator paths(renderScene, {}, product);
   const std::vector<SurfaceHit> vertices = verticesOfPaths(renderScene, camera, product, o.vertices);
-  const Laboratory lab{renderScene, paths, guided, product, o};
+  const Laboratory lab{renderScene, paths, guided, product, fixedShares, o};
   fmt::print("{}\n", report(gradeAll(lab, reductions, vertices), reductions).dump(2));
 }
 

@@ -14,6 +14,10 @@ SamplingStrategy asCounted(Strategy strategy) {
   }
 }
 
+float sideOf(const SurfaceHit& hit) {
+  return hit.wo.z() >= 0 ? 1.0f : -1.0f;
+}
+
 /// The frame in which both factors of the product are given, as seen from the shading frame: z is the shading normal on
 /// the side of wo, x the record's tangent made orthogonal to it. So records need no turning on flat surfaces.
 Eigen::Matrix3f guideAxes(const SurfaceHit& hit, const PackedRecord& record, float side) {
@@ -61,27 +65,27 @@ GuidedSampler::GuidedSampler(const Scene& scene, const IlluminationCache& illumi
   }
 }
 
-GuidedSampler::Vertex::Vertex(const GuidedSampler& sampler, const SurfaceHit& hit) : hit_(hit) {
-  const float side = hit.wo.z() >= 0 ? 1.0f : -1.0f;
-  const PackedRecord* record = sampler.illumination_.find(hit.position, side * hit.normal);
-  if (!record) return;
-  axes_ = guideAxes(hit, *record, side);
+GuidedSampler::Vertex::Vertex(const GuidedSampler& sampler, const SurfaceHit& hit)
+    : hit_(hit), record_(sampler.illumination_.find(hit.position, sideOf(hit) * hit.normal)) {
+  if (!record_) return;
+  const float side = sideOf(hit);
+  axes_ = guideAxes(hit, *record_, side);
   const LobeMixture mixture = hit.bsdf->mixture(hit.wo, hit.uv);
-  irradiance_ = record->irradiance;
   product_ = sampler.caches_ != nullptr;
   if (product_) collectReflectance(sampler, hit, mixture, side);
-  const float covered = (1 - mixture.transmittedShare) * coveredShare(reflectance_);
-  decision_ = decide(*record, covered);
+  covered_ = (1 - mixture.transmittedShare) * coveredShare(reflectance_);
+  decision_ = decide();
   const bool halves = !product_ || decision_ == GuidingDecision::undersampled;
   if (decision_ != GuidingDecision::narrow && decision_ != GuidingDecision::even)
-    density_.emplace(reflectance_, *record, onCovered(halves ? kGuidedShares : kProductShares, covered));
+    density_.emplace(reflectance_, *record_,
+                     onCovered(halves ? kGuidedShares : productShares(record_->bsdfShare), covered_));
 }
 
-GuidingDecision GuidedSampler::Vertex::decide(const PackedRecord& record, float covered) const {
-  if (covered <= 0) return GuidingDecision::narrow;
+GuidingDecision GuidedSampler::Vertex::decide() const {
+  if (covered_ <= 0) return GuidingDecision::narrow;
   if (!product_) return GuidingDecision::illumination;
-  if (record.samples < kUndersampled) return GuidingDecision::undersampled;
-  if (record.background > kEvenBackground) return GuidingDecision::even;
+  if (record_->samples < kUndersampled) return GuidingDecision::undersampled;
+  if (record_->background > kEvenBackground) return GuidingDecision::even;
   return reflectance_.gaussians.count() > 0 ? GuidingDecision::product : GuidingDecision::illumination;
 }
 
@@ -125,13 +129,23 @@ float GuidedSampler::Vertex::pdf(const Vec3& wi) const {
   return density_ ? density_->bsdfShare() * bsdf + density_->guidedPdf(toGuide(wi)) : bsdf;
 }
 
+std::optional<ShareSample> GuidedSampler::Vertex::shareSample(const Vec3& wi) const {
+  if (decision_ != GuidingDecision::product && !(product_ && decision_ == GuidingDecision::illumination))
+    return std::nullopt;
+  const float bsdf = hit_.bsdf->pdf(hit_.wo, wi, hit_.uv);
+  const float divided = covered_ * (1 - record_->bsdfShare);  // the mixtures' with the background that is the BSDF's
+  const float background = density_->bsdfShare() - (1 - divided);
+  const float mixtures = (std::max(0.0f, background) * bsdf + density_->guidedPdf(toGuide(wi))) / divided;
+  return ShareSample{record_, bsdf, mixtures, covered_};
+}
+
 std::optional<float> GuidedSampler::Vertex::reflectedRadiance() const {
   // Nothing is known of light that comes through the surface.
-  if (!(irradiance_ > 0) || hit_.bsdf->transmits()) return std::nullopt;
+  if (!record_ || !(record_->irradiance > 0) || hit_.bsdf->transmits()) return std::nullopt;
   const float diffuse = product_ ? reflectance_.uncoveredAlbedo : luminance(hit_.bsdf->albedo(hit_.wo, hit_.uv));
-  if (!product_) return irradiance_ * diffuse * kInvPi;
+  if (!product_) return record_->irradiance * diffuse * kInvPi;
   const bool shaped = decision_ == GuidingDecision::product || decision_ == GuidingDecision::illumination;
-  return irradiance_ * (diffuse * kInvPi + (shaped ? density_->reflected() : reflectance_.backgroundMass));
+  return record_->irradiance * (diffuse * kInvPi + (shaped ? density_->reflected() : reflectance_.backgroundMass));
 }
 
 Rgb GuidedIntegrator::radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const {

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "runtime/guiding/brdf_caches.h"
-#include "runtime/guiding/guided_density.h"
+#include "runtime/guiding/selection_share.h"
 #include "runtime/render/path_loop.h"
 
 namespace lobe {
@@ -30,22 +30,25 @@ class GuidedSampler {
     /// Whether there is a record for this point.
     bool guided() const { return density_.has_value(); }
     GuidingDecision decision() const { return decision_; }
+    /// What a direction tells of the record's shares, but for its weight; nullopt where they are not used.
+    std::optional<ShareSample> shareSample(const Vec3& wi) const;
     /// The part of the density that is the BSDF's own: pdf(wi) − bsdfShare() · pdf of the BSDF is the mixtures'.
     float bsdfShare() const { return density_ ? density_->bsdfShare() : 1.0f; }
 
    private:
     void collectReflectance(const GuidedSampler& sampler, const SurfaceHit& hit, const LobeMixture& mixture,
                             float side);
-    GuidingDecision decide(const PackedRecord& record, float covered) const;
+    GuidingDecision decide() const;
     Vec3 toGuide(const Vec3& wi) const { return axes_ * wi; }
 
     const SurfaceHit& hit_;
-    Reflectance reflectance_;
-    Eigen::Matrix3f axes_;  // from the shading frame to the guide's
-    std::optional<GuidedDensity> density_;
-    float irradiance_ = 0;  // of the record
-    bool product_ = false;
+    const PackedRecord* record_;  // nullptr: none serves the point, and density_ is empty
+    Eigen::Matrix3f axes_;        // from the shading frame to the guide's
+    float covered_ = 0;           // share of samples that mixtures may draw
     GuidingDecision decision_ = GuidingDecision::noRecord;
+    bool product_ = false;
+    Reflectance reflectance_;
+    std::optional<GuidedDensity> density_;
   };
 
  private:

@@ -36,7 +36,11 @@ void ImportonWalk::run(const Ray& cameraRay) {
   for (int i = 0; i < count_; ++i) {
     Particle& particle = vertices_[i].particle;
     particle.weight *= vertices_[i].radiance;
-    if (usable(particle.weight)) result_.samples.push_back(particle);
+    if (wishes_.samples && usable(particle.weight)) result_.samples.push_back(particle);
+    if (std::optional<ShareSample>& share = vertices_[i].share) {
+      share->weight *= vertices_[i].radiance;
+      if (usable(share->weight)) result_.shares.push_back(*share);
+    }
   }
 }
 
@@ -71,7 +75,7 @@ bool ImportonWalk::advance() {
   flight_.ray = spawnRay(*hit, scattered->direction);
   pdf_ = scattered->pdf;
   previous_ = hit->position;
-  if (scattered->pdf > 0) remember(*hit, *scattered);
+  if (scattered->pdf > 0) remember(*hit, *vertex, *scattered);
   return survivesAlbedo(flight_.weight, *hit, rng_) && usable(luminance(flight_.weight));
 }
 
@@ -93,7 +97,7 @@ void ImportonWalk::escape() {
 }
 
 void ImportonWalk::addDirectLight(const SurfaceHit& hit, const GuidedSampler::Vertex& vertex, float smoothShare) {
-  if (!wishes_.uses && !wishes_.samples) return;
+  if (!wishes_.uses && !wishes_.samples && !wishes_.shares) return;
   const float choice = rng_.uniform();
   const std::optional<LightSample> light = scene_.lights.sample(hit.position, choice, rng_.uniform2());
   if (!light) return;
@@ -105,7 +109,7 @@ void ImportonWalk::addDirectLight(const SurfaceHit& hit, const GuidedSampler::Ve
   const float weight = light->delta ? 1.0f : misWeight(light->pdf, smoothShare * vertex.pdf(wi));
   if (!light->source && !light->delta)
     addEnvironmentLight(hit, light->wi, value, weight);
-  else if (wishes_.samples && scene_.visible(hit, *light))
+  else if ((wishes_.samples || wishes_.shares) && scene_.visible(hit, *light))
     collect(value * weight);
 }
 
@@ -123,13 +127,16 @@ void ImportonWalk::collect(const Rgb& light) {
     vertices_[i].radiance += luminance((vertices_[i].carried > 0).select(light / vertices_[i].carried, Rgb::Zero()));
 }
 
-void ImportonWalk::remember(const SurfaceHit& hit, const Scattered& scattered) {
+void ImportonWalk::remember(const SurfaceHit& hit, const GuidedSampler::Vertex& vertex, const Scattered& scattered) {
   scattered_ = true;
-  if (!wishes_.samples) return;
+  if (!wishes_.samples && !wishes_.shares) return;
   const Vec3 normal = normalTowards(hit, scattered.direction);
   const float cosine = normal.dot(scattered.direction);
-  vertices_[count_++] = {{hit.position, normal, scattered.direction, cosine / scattered.pdf, kInfinity},
-                         flight_.weight};
+  Vertex& last = vertices_[count_++];
+  last = {.particle = {hit.position, normal, scattered.direction, cosine / scattered.pdf, kInfinity},
+          .carried = flight_.weight,
+          .share = wishes_.shares ? vertex.shareSample(scattered.wi) : std::nullopt};
+  if (last.share) last.share->weight = luminance(scattered.weight);
   awaitsDistance_ = true;
 }
 

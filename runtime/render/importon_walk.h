@@ -22,7 +22,8 @@ struct ImportonResult {
   std::vector<RecordRequest> requests;
   std::vector<EnvironmentUse> uses;
   std::vector<Particle> importance;  ///< what arrived from the camera after a first scattering
-  std::vector<Particle> samples;  ///< incident light that the path found: weight L cosθ over the direction's density
+  std::vector<Particle> samples;    ///< incident light that the path found: weight L cosθ over the direction's density
+  std::vector<ShareSample> shares;  ///< of the vertices that the product was sampled at
 };
 
 /// What to spend time on.
@@ -30,6 +31,7 @@ struct ImportonWishes {
   bool uses = false;        ///< the scene has an environment that photons may start from
   bool importance = false;  ///< photons are to be guided
   bool samples = false;     ///< records learn from camera paths
+  bool shares = false;      ///< records learn from them how often the BSDF is to choose
 };
 
 class ImportonWalk {
@@ -46,6 +48,7 @@ class ImportonWalk {
     Particle particle;  // its weight still without the radiance
     Rgb carried;        // the flight's weight behind this vertex, before Russian roulette
     float radiance = 0;
+    std::optional<ShareSample> share;  // its weight without the radiance as well
   };
   bool advance();
   void arrive(const SurfaceHit& hit);
@@ -53,7 +56,7 @@ class ImportonWalk {
   void addDirectLight(const SurfaceHit& hit, const GuidedSampler::Vertex& vertex, float smoothShare);
   void addEnvironmentLight(const SurfaceHit& hit, const Vec3& wi, const Rgb& light, float weight);
   void collect(const Rgb& light);
-  void remember(const SurfaceHit& hit, const Scattered& scattered);
+  void remember(const SurfaceHit& hit, const GuidedSampler::Vertex& vertex, const Scattered& scattered);
 
   const RenderScene& scene_;
   const GuidedSampler& sampler_;

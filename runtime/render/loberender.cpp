@@ -44,6 +44,10 @@ void declareTraining(CLI::App& app, RenderJob& job) {
   app.add_option("--importons", plan.importons, "Importons a pass")->capture_default_str();
   app.add_option("--components", plan.records.components, "Gaussians of an illumination record, 1 to 8")
       ->capture_default_str();
+  app.add_option("--shares", plan.learnShares,
+                 "How often product leaves a direction to the BSDF: learnt by each record, or fixed")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, bool>{{"learnt", true}, {"fixed", false}}))
+      ->default_str("learnt");
   app.add_option("--train-seconds", job.trainSeconds,
                  "Training ends by then, as far as can be foreseen (default: 0.15 of --seconds; with --spp no limit)");
   app.add_option("--save-illumination", job.saveIllumination, "Keep what was trained in this file (.illum)");

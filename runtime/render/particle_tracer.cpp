@@ -48,7 +48,8 @@ ImportonResult ParticleTracer::traceImportons(int pass, int count, const Importo
         ImportonWalk(scene_, radiance_, wishes, rng, result).run(ray);
       });
   return {joined(results, &ImportonResult::requests), joined(results, &ImportonResult::uses),
-          joined(results, &ImportonResult::importance), joined(results, &ImportonResult::samples)};
+          joined(results, &ImportonResult::importance), joined(results, &ImportonResult::samples),
+          joined(results, &ImportonResult::shares)};
 }
 
 PhotonResult ParticleTracer::tracePhotons(int pass, int count) const {

@@ -65,7 +65,8 @@ class Training {
         importanceSampler_(scene.scene, importance_.cache(), nullptr) {
     const bool tracesPhotons = plan.from != TrainFrom::paths;
     if (tracesPhotons && scene.lights.environmentProbability() > 0) guide_.emplace(scene.lights);
-    wishes_ = {guide_.has_value(), tracesPhotons, plan.from != TrainFrom::photons};
+    wishes_ = {guide_.has_value(), tracesPhotons, plan.from != TrainFrom::photons,
+               plan.learnShares && caches != nullptr};
     tracer_.emplace(scene, camera, radianceSampler_, importanceSampler_, guide_ ? &*guide_ : nullptr, plan.seed);
   }
   // Tracer and samplers refer to the other members.
@@ -81,6 +82,7 @@ class Training {
       guide_->update();
     }
     samples_ = std::move(importons.samples);
+    radiance_.learnShares(importons.shares);
     PhotonResult photons;
     if (wishes_.importance) photons = tracer_->tracePhotons(pass, shareOf(plan_.photons, size));
     photons_ = std::move(photons.particles);

@@ -25,6 +25,7 @@ struct TrainingPlan {
   /// Passes end by then, as far as can be foreseen: they begin small and double. Results depend on the machine's speed.
   double seconds = kInfinity;
   std::uint64_t seed = 1;
+  bool learnShares = true;  ///< of the BSDF, by record, else kProductShares; without caches there is nothing to learn
   bool keepParticles = false;  ///< of the last pass, for TrainedIllumination::particles
   TrainingOptions records;
 
