@@ -60,6 +60,7 @@ class Studio {
   const GuidedSampler& productSampler() const { return *product_; }
   const IlluminationCache& illumination() const { return illumination_; }
   const BrdfCaches& caches() const { return *caches_; }
+  std::filesystem::path lobes() const { return folder_ / "lobes"; }
 
  private:
   Folder folder_;

@@ -36,6 +36,27 @@ std::vector<Reflectance> someReflectances(const Studio& studio) {
 
 }  // namespace
 
+TEST_CASE("unbiased: lobes are looked up at the nearest elevation") {
+  const Studio studio(readScene(std::string(LOBE_SOURCE_DIR) + "/scenes/jewelry.xml"), 60, 40);
+  const std::vector<LobeRequest> requests = lobeRequests(studio.scene());
+  int elevations = 0, others = 0;
+  for (std::size_t lobe = 0; lobe < requests.size(); ++lobe) {
+    const LobeCache cache = LobeCache::open(studio.lobes() / lobeFileName(requests[lobe].model, requests[lobe].key));
+    const DirectionGrid grid{static_cast<GridKind>(cache.info().gridKind), static_cast<int>(cache.info().gridCount)};
+    if (grid.kind != GridKind::elevation) continue;
+    for (int i = 0; i < 1000; ++i, ++elevations) {
+      const float theta = 1.57f * (static_cast<float>(i) + 0.5f) / 1000;
+      const Vec3 wo(0, std::sin(theta), std::cos(theta));
+      Reflectance reflectance;
+      studio.caches().add(static_cast<int>(lobe), wo, Vec2::UnitX(), 1, reflectance);
+      const CacheRecord& expected = cache.records()[cache.lookup(static_cast<std::uint32_t>(grid.nearest(wo)))];
+      others += reflectance.albedo + reflectance.uncoveredAlbedo != expected.albedo;
+    }
+  }
+  CHECK(elevations >= 1000);
+  CHECK(others <= elevations / 1000);  // halfway between two
+}
+
 TEST_CASE("unbiased: samples of trained records and fitted lobes have the density that is said", "[slow]") {
   const Studio studio(readScene(std::string(LOBE_SOURCE_DIR) + "/scenes/jewelry.xml"), 60, 40);
   const std::vector<Reflectance> reflectances = someReflectances(studio);

@@ -48,6 +48,24 @@ BrdfCaches::Entry::Entry(LobeCache opened, float reduction)
     packLanes(mixture, lanes.data() + records.back().first, stride);
   }
   lanes.resize(lanes.size() + kMostLanes);  // kernels read whole sets of lanes
+  if (grid.kind == GridKind::elevation) findSteps();
+}
+
+void BrdfCaches::Entry::findSteps() {
+  recordOfStep = {cache.lookup(0)};
+  for (int i = 1; i < grid.count; ++i) {
+    const std::uint32_t record = cache.lookup(static_cast<std::uint32_t>(i));
+    if (record == recordOfStep.back()) continue;
+    steps.push_back((grid.direction(i - 1) + grid.direction(i)).normalized().z());
+    recordOfStep.push_back(record);
+  }
+}
+
+const BrdfCaches::Record& BrdfCaches::Entry::nearest(const Vec3& wo) const {
+  if (grid.kind != GridKind::elevation) return records[cache.lookup(static_cast<std::uint32_t>(grid.nearest(wo)))];
+  std::size_t step = 0;
+  for (const float cosine : steps) step += wo.z() < cosine ? 1 : 0;
+  return records[recordOfStep[step]];
 }
 
 BrdfCaches::BrdfCaches(const std::filesystem::path& folder, std::span<const LobeRequest> requests,
@@ -76,7 +94,7 @@ BrdfCaches::BrdfCaches(const std::filesystem::path& folder, std::span<const Lobe
 void BrdfCaches::add(int lobe, const Vec3& wo, const Vec2& turn, float tint, Reflectance& reflectance) const {
   const Entry& entry = caches_[cacheOfRequest_[lobe]];
   const Mirror mirror = entry.cache.info().quarter ? Mirror::intoQuadrant(wo) : Mirror{};
-  const auto& record = entry.records[entry.cache.lookup(static_cast<std::uint32_t>(entry.grid.nearest(mirror(wo))))];
+  const Record& record = entry.nearest(mirror(wo));
   const bool covered = record.count > 0 && record.count <= reflectance.gaussians.room();
   (covered ? reflectance.albedo : reflectance.uncoveredAlbedo) += tint * record.albedo;
   if (!covered) return;

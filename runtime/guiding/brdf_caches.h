@@ -52,12 +52,23 @@ class BrdfCaches {
     /// The view of its components.
     LanesView view(const std::vector<float>& lanes) const { return {lanes.data() + first, stride, count}; }
   };
-  struct Entry {
+  class Entry {
+   public:
     Entry(LobeCache opened, float reduction);
+    /// The record of the grid's direction nearest to wo, which is mirrored where the grid is of a quarter.
+    const Record& nearest(const Vec3& wo) const;
+
     LobeCache cache;
     DirectionGrid grid;
     std::vector<Record> records;
     std::vector<float> lanes;  ///< of all records
+    /// Of grids of elevations: the cosines, falling, where the next of recordOfStep serves. They are few, so that to
+    /// count those above a cosine takes less time than DirectionGrid::nearest.
+    std::vector<float> steps;
+    std::vector<std::uint32_t> recordOfStep;
+
+   private:
+    void findSteps();
   };
   std::vector<Entry> caches_;
   std::vector<int> cacheOfRequest_;
