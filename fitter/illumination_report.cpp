@@ -45,7 +45,7 @@ std::vector<Distribution> distributions(const IlluminationFile& file) {
   return {distributionOf(file, "radius", [](const auto& r) { return r.radius; }),
           distributionOf(file, "samples", [](const auto& r) { return r.samples; }),
           distributionOf(file, "background", [](const auto& r) { return r.background; }),
-          distributionOf(file, "BSDF share", [](const auto& r) { return r.bsdfShare; }),
+          distributionOf(file, "bsdf_share", [](const auto& r) { return r.bsdfShare; }),
           distributionOf(file, "irradiance", [](const auto& r) { return r.irradiance; }),
           distributionOf(file, "components", [](const auto& r) { return r.count; })};
 }
@@ -89,7 +89,8 @@ Json toJson(const IlluminationFile& file, const std::filesystem::path& path, boo
               {"photons", s.photons},
               {"importons", s.importons},
               {"components", s.components},
-              {"seed", s.seed}}},
+              {"seed", s.seed},
+              {"learnt_shares", s.learntShares}}},
             {"particles", info.particles},
             {"unit", shortNumber(info.unit)},
             {"bytes", file.bytes()},
@@ -107,8 +108,10 @@ void printIllumination(const IlluminationFile& file, const std::filesystem::path
   const IlluminationInfo& info = file.info();
   const StoredTrainingSettings& s = info.settings;
   fmt::print(out, "{}\n  scene      {}, hash {:016x}\n", path.string(), info.scene, info.sceneHash);
-  fmt::print(out, "  settings   trained from {}, {} passes of {} photons and {} importons, {} components, seed {}\n",
-             s.from, s.passes, s.photons, s.importons, s.components, s.seed);
+  fmt::print(
+      out,
+      "  settings   trained from {}, {} passes of {} photons and {} importons, {} components, seed {}, {} shares\n",
+      s.from, s.passes, s.photons, s.importons, s.components, s.seed, s.learntShares ? "learnt" : "fixed");
   fmt::print(out, "  training   {} particles; unit of length {:.4g}\n", info.particles, info.unit);
   fmt::print(out, "  records    {}, of which {:.2f} % undersampled\n", file.records().size(),
              100 * info.undersampledShare);
@@ -138,12 +141,12 @@ void printRecords(const IlluminationFile& file, std::FILE* out) {
 void writePoints(const IlluminationFile& file, const std::filesystem::path& out) {
   std::string text = "ply\nformat binary_little_endian 1.0\n";
   text += fmt::format("element vertex {}\n", file.records().size());
-  for (const char* property : {"x", "y", "z", "nx", "ny", "nz", "radius", "samples", "background"})
+  for (const char* property : {"x", "y", "z", "nx", "ny", "nz", "radius", "samples", "background", "bsdf_share"})
     text += fmt::format("property float {}\n", property);
   text += "end_header\n";
   for (const StoredIllumination& r : file.records()) {
-    const std::array<float, 9> vertex{r.position[0], r.position[1], r.position[2], r.normal[0], r.normal[1],
-                                      r.normal[2],   r.radius,      r.samples,     r.background};
+    const std::array<float, 10> vertex{r.position[0], r.position[1], r.position[2], r.normal[0],  r.normal[1],
+                                       r.normal[2],   r.radius,      r.samples,     r.background, r.bsdfShare};
     text.append(reinterpret_cast<const char*>(vertex.data()), sizeof(vertex));
   }
   writeAtomically(out, text);

@@ -40,7 +40,7 @@ void checkRecord(const StoredIllumination& r, std::size_t index, std::span<const
   require(r.background >= 0 && r.background <= 1, "share of the background out of range");
   require(r.irradiance >= 0, "a negative irradiance");
   require(r.samples >= 0, "a negative number of samples");
-  require(r.bsdfShare > 0 && r.bsdfShare <= 1, "share of the BSDF out of range");
+  require(r.bsdfShare > 0 && r.bsdfShare < 1, "share of the BSDF out of range");
   require(r.count <= kMaxStoredComponents, "number of components out of range");
   require(componentsInRange(r.first, r.count, components), "components out of range");
   require(r.count == 0 || weightsSumToOne(components.subspan(r.first, r.count)), "the weights do not sum to one");
@@ -51,7 +51,8 @@ IlluminationInfo readInfo(const fb::Illumination& file) {
   return {.toolVersion = file.tool_version()->str(),
           .scene = file.scene()->str(),
           .sceneHash = file.scene_hash(),
-          .settings = {s.from()->str(), s.passes(), s.photons(), s.importons(), s.components(), s.seed()},
+          .settings = {s.from()->str(), s.passes(), s.photons(), s.importons(), s.components(), s.seed(),
+                       s.learnt_shares()},
           .particles = file.particles(),
           .undersampledShare = file.undersampled_share(),
           .unit = file.unit()};
@@ -87,7 +88,7 @@ std::vector<std::byte> encodeIllumination(const IlluminationInfo& info, std::spa
   flatbuffers::FlatBufferBuilder builder(1024 + records.size_bytes() + components.size_bytes());
   const StoredTrainingSettings& s = info.settings;
   const auto settings = fb::CreateTrainingSettings(builder, builder.CreateString(s.from), s.passes, s.photons,
-                                                   s.importons, s.components, s.seed);
+                                                   s.importons, s.components, s.seed, s.learntShares);
   const auto toolVersion = builder.CreateString(info.toolVersion);
   const auto scene = builder.CreateString(info.scene);
   const auto recordVector =

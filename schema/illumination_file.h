@@ -13,7 +13,7 @@
 
 namespace lobe {
 
-inline constexpr FileFormat kIlluminationFormat{{'I', 'L', 'L', 'U'}, 2, 0};
+inline constexpr FileFormat kIlluminationFormat{{'I', 'L', 'L', 'U'}, 2, 1};
 
 /// Read in place: the layout is the schema's (checked when compiled, the order of the fields by a test). A new field
 /// goes here, into illumination.fbs, the checks of illumination_file.cpp and runtime/guiding/illumination_store.cpp.
@@ -30,6 +30,7 @@ struct StoredTrainingSettings {
   std::string from = "both";
   std::uint32_t passes = 0, photons = 0, importons = 0, components = 0;
   std::uint64_t seed = 0;
+  bool learntShares = false;  ///< bsdfShare is each record's own
   bool operator==(const StoredTrainingSettings&) const = default;
 };
 

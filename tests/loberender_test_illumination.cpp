@@ -36,6 +36,30 @@ TEST_CASE("loberender: what was trained once renders the same picture again") {
   }
 }
 
+TEST_CASE("loberender: product says when its illumination has learnt no shares") {
+  const SceneFolder folder(true);
+  const std::string note = "have learnt no shares of the BSDF";
+  const auto noteOf = [&](const std::string& integrator) {
+    return folder.run("loberender scene.xml --spp 1 -o a.exr --illumination a.illum --integrator " + integrator).error;
+  };
+  REQUIRE(folder.run(kSave).code == 0);
+  const std::string learnt = folder.bytes("a.illum");
+  CHECK_THAT(noteOf("product"), !Catch::Contains(note));
+  REQUIRE(folder.run(kSave + " --shares fixed").code == 0);
+  CHECK(folder.bytes("a.illum") != learnt);
+  CHECK_THAT(noteOf("product"), Catch::Contains(note));
+  REQUIRE(folder.run(kSave + " --integrator guided").code == 0);
+  CHECK_THAT(noteOf("product"), Catch::Contains(note));
+  CHECK_THAT(noteOf("guided"), !Catch::Contains(note));
+
+  const std::string unused =
+      "loberender scene.xml --spp 1 -o a.exr --shares fixed --passes 1 --photons 100 --importons 100 --integrator ";
+  CHECK_THAT(folder.run(unused + "path").error,
+             Catch::Contains("path has no use for --passes, --photons, --importons, --shares"));
+  CHECK_THAT(folder.run(unused + "guided").error, Catch::Contains("guided has no use for --shares"));
+  CHECK_THAT(folder.run(unused + "product").error, !Catch::Contains("no use for"));
+}
+
 TEST_CASE("loberender: illumination serves other cameras of a scene, and no other scene") {
   const SceneFolder folder(false);
   const std::string guided = " --integrator guided --spp 1";
@@ -78,6 +102,10 @@ TEST_CASE("loberender: options that contradict a file of illumination") {
       {" --illumination a.illum --train paths", "--train"},
       {" --illumination a.illum --components 4", "--components"},
       {" --illumination a.illum --train-seconds 1", "--train-seconds"},
+      {" --illumination a.illum --shares fixed", "--shares"},
+      {" --shares all", "--shares"},
+      {" --components 9", "--components"},
+      {" --photons 0", "--photons"},
       {" --illumination a.illum --save-illumination b.illum", "--save-illumination"},
       {" --illumination a.illum --integrator path", "path has none"},
       {" --save-illumination a.illum --integrator path", "path has none"},
@@ -129,15 +157,16 @@ TEST_CASE("lobedump: shows illumination to people, machines and viewers of point
   REQUIRE(folder.run(kSave).code == 0);
   const ToolRun text = folder.run("lobedump a.illum");
   CHECK(text.code == 0);
-  CHECK_THAT(text.out, Catch::Contains("/scene.xml, hash") &&
-                           Catch::Contains("from both, 1 passes of 2000 photons and 1000") &&
-                           Catch::Contains("radius") && Catch::Contains("undersampled"));
+  CHECK_THAT(text.out,
+             Catch::Contains("/scene.xml, hash") && Catch::Contains("from both, 1 passes of 2000 photons and 1000") &&
+                 Catch::Contains("radius") && Catch::Contains("undersampled") && Catch::Contains("learnt shares"));
   const auto json = nlohmann::json::parse(folder.run("lobedump --json a.illum").out).at(0);
   const long records = json.at("record_count");
   REQUIRE(records > 1);
   CHECK(json.at("bytes") == folder.bytes("a.illum").size());
   CHECK(static_cast<double>(json.at("bytes")) < 600.0 * static_cast<double>(records) + 2000);
   CHECK((json.at("settings").at("seed") == 1 && json.at("settings").at("from") == "both"));
+  CHECK(json.at("settings").at("learnt_shares") == true);
   CHECK_FALSE(json.contains("records"));
   const auto& radius = json.at("distributions").at("radius");
   CHECK((radius.at("min") > 0 && radius.at("min") <= radius.at("median") && radius.at("max") <= json.at("unit")));
@@ -148,7 +177,7 @@ TEST_CASE("lobedump: shows illumination to people, machines and viewers of point
   REQUIRE(folder.run("lobedump a.illum --points p.ply").code == 0);
   const std::string ply = folder.bytes("p.ply"), end = "end_header\n";
   CHECK_THAT(ply, Catch::StartsWith("ply\n") && Catch::Contains("element vertex " + std::to_string(records) + "\n"));
-  CHECK(ply.size() == ply.find(end) + end.size() + static_cast<std::size_t>(records) * 9 * sizeof(float));
+  CHECK(ply.size() == ply.find(end) + end.size() + static_cast<std::size_t>(records) * 10 * sizeof(float));
 
   const std::string lobe = folder.caches().front().string();
   CHECK(folder.run("lobedump a.illum " + lobe).code == 2);

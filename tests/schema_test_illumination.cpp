@@ -23,9 +23,9 @@ struct Content {
 
 Content smallFile() {
   Content c;
-  c.info = {"0.1.0", "house/scene.xml", 0x0123456789abcdef, {"photons", 3, 1000, 500, 8, 7}, 2500, 0.25, 0.5f};
+  c.info = {"0.1.0", "house/scene.xml", 0x0123456789abcdef, {"photons", 3, 1000, 500, 8, 7, true}, 2500, 0.25, 0.5f};
   c.records = {{{1, 2, 3}, {0, 0, 1}, {1, 0, 0}, 0.5f, 0.25f, 3.5f, 100, 0.3f, 0, 2},
-               {{-1, 0, 5}, {0, 1, 0}, {0, 0, -1}, 0.125f, 1.0f, 0, 0, 1.0f, 2, 0}};
+               {{-1, 0, 5}, {0, 1, 0}, {0, 0, -1}, 0.125f, 1.0f, 0, 0, 0.9f, 2, 0}};
   c.components = {{0.25f, -0.1f, 0.3f, 0.02f, 0.0f, 0.05f}, {0.75f, 0.4f, -0.2f, 0.01f, -0.005f, 0.06f}};
   return c;
 }
@@ -153,7 +153,7 @@ TEST_CASE("schema: faults of meaning in illumination are refused") {
       {"not finite", [&](Content& c) { c.records[1].irradiance = infinity; }},
       {"number of samples", [](Content& c) { c.records[1].samples = -1; }},
       {"share of the BSDF", [](Content& c) { c.records[1].bsdfShare = 0; }},
-      {"share of the BSDF", [](Content& c) { c.records[1].bsdfShare = 1.1f; }},
+      {"share of the BSDF", [](Content& c) { c.records[1].bsdfShare = 1; }},
       {"share of the BSDF", [&](Content& c) { c.records[0].bsdfShare = nan; }},
       {"number of components", [](Content& c) { c.records[1].count = kMaxStoredComponents + 1; }},
       {"components out of range", [](Content& c) { c.records[0].first = 1; }},

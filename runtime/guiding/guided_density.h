@@ -23,7 +23,7 @@ struct StrategyShares {
 /// Measured (scripts/bench-vertices): with more of the product the worst vertices get worse and the median no better;
 /// with less the median gets worse.
 inline constexpr StrategyShares kProductShares{0.70f, 0.20f, 0.10f};
-/// The same with another share of the BSDF, in (0,1]; the mixtures keep their ratio.
+/// The same with another share of the BSDF, in (0,1); the mixtures keep their ratio.
 inline StrategyShares productShares(float bsdf) {
   const float rest = (1 - bsdf) / (kProductShares.product + kProductShares.illumination);
   return {rest * kProductShares.product, bsdf, rest * kProductShares.illumination};

@@ -12,9 +12,11 @@ void BenchTraining::declare(CLI::App& app) {
   app.add_option("--width", width, "Of the picture, in pixels; its shape stays")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_option("--photons", plan.photons, "Photons a pass")->capture_default_str();
-  app.add_option("--importons", plan.importons, "Importons a pass")->capture_default_str();
-  app.add_option("--components", plan.records.components, "Gaussians of a record")->capture_default_str();
+  app.add_option("--photons", plan.photons, "Photons a pass")->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--importons", plan.importons, "Importons a pass")->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--components", plan.records.components, "Gaussians of a record, 1 to 8")
+      ->check(CLI::Range(1, kMaxLightComponents))
+      ->capture_default_str();
   app.add_option("--seed", plan.seed, "Of the training")->capture_default_str();
   app.add_flag("--lenient", read.lenient, "Pass over what the reader does not know");
   addDefinitions(app, read.definitions);

@@ -41,8 +41,8 @@ float coveredShare(const Reflectance& reflectance) {
   return all > 0 ? reflectance.albedo / all : 1.0f;
 }
 
-// Records that have seen less than five particles a component know little, and light of which less than this share has
-// a shape is sampled by the BSDF as well as by a product.
+// Records that have seen less than five particles for each of eight components know little, and light of which less
+// than this share has a shape is sampled by the BSDF as well as by a product.
 constexpr float kUndersampled = 40;
 constexpr float kEvenBackground = 0.98f;
 

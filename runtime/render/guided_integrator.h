@@ -28,7 +28,7 @@ class GuidedSampler {
     float pdf(const Vec3& wi) const;
     std::optional<float> reflectedRadiance() const;
     /// Whether there is a record for this point.
-    bool guided() const { return density_.has_value(); }
+    bool hasRecord() const { return record_ != nullptr; }
     GuidingDecision decision() const { return decision_; }
     /// What a direction tells of the record's shares, but for its weight; nullopt where they are not used.
     std::optional<ShareSample> shareSample(const Vec3& wi) const;

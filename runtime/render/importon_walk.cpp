@@ -65,7 +65,7 @@ bool ImportonWalk::advance() {
   const float delta = hit->bsdf->deltaProbability(hit->wo, hit->uv);
   if (delta < 1) {
     vertex.emplace(sampler_, *hit);
-    if (!vertex->guided()) result_.requests.push_back({hit->position, normalTowards(*hit)});
+    if (!vertex->hasRecord()) result_.requests.push_back({hit->position, normalTowards(*hit)});
     arrive(*hit);
     addDirectLight(*hit, *vertex, 1 - delta);
   }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstdint>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <oneapi/tbb/global_control.h>
 
 #include "runtime/render/render_job.h"
@@ -25,35 +27,43 @@ std::pair<int, int> parsePair(const std::string& option, const std::string& text
 constexpr std::uint64_t kMaxSeed = std::uint64_t{1} << 53;  // a picture's metadata holds it exactly
 
 const std::vector<std::string> kIntegratorNames{"path", "guided", "product"};  // in the order of IntegratorKind
+const std::vector<std::string> kSharesNames{"fixed", "learnt"};
 
 struct Options {
   RenderJob job;
-  std::string size, record, integrator = "product";
+  std::string size, record, integrator = "product", shares = "learnt";
   int threads = 0;
+  std::vector<const CLI::Option*> training;
 };
 
 /// --illumination goes with none of the options declared here.
-void declareTraining(CLI::App& app, RenderJob& job) {
+void declareTraining(CLI::App& app, Options& options) {
+  RenderJob& job = options.job;
   app.option_defaults()->group("Training");
   TrainingPlan& plan = job.training;
   app.add_option("--train", plan.from, "What records learn from: photons, paths (of the camera) or both")
       ->transform(CLI::CheckedTransformer(trainFromNames()))
       ->default_str("both");
   app.add_option("--passes", job.passes, "Training passes (default: 8, or as many as fit into the training's seconds)");
-  app.add_option("--photons", plan.photons, "Photons a pass")->capture_default_str();
-  app.add_option("--importons", plan.importons, "Importons a pass")->capture_default_str();
+  app.add_option("--photons", plan.photons, "Photons a pass")->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--importons", plan.importons, "Importons a pass")->check(CLI::PositiveNumber)->capture_default_str();
   app.add_option("--components", plan.records.components, "Gaussians of an illumination record, 1 to 8")
+      ->check(CLI::Range(1, kMaxLightComponents))
       ->capture_default_str();
-  app.add_option("--shares", plan.learnShares,
-                 "How often product leaves a direction to the BSDF: learnt by each record, or fixed")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, bool>{{"learnt", true}, {"fixed", false}}))
-      ->default_str("learnt");
+  app.add_option("--shares", options.shares,
+                 "How often product leaves a direction to the BSDF: learnt (by each record) or fixed")
+      ->check(CLI::IsMember(kSharesNames))
+      ->capture_default_str();
   app.add_option("--train-seconds", job.trainSeconds,
                  "Training ends by then, as far as can be foreseen (default: 0.15 of --seconds; with --spp no limit)");
+  const auto ofTraining = [&app] {
+    return app.get_options([](const CLI::Option* o) { return o->get_group() == "Training"; });
+  };
+  for (const CLI::Option* option : ofTraining()) options.training.push_back(option);
   app.add_option("--save-illumination", job.saveIllumination, "Keep what was trained in this file (.illum)");
   auto* stored = app.add_option("--illumination", job.illumination,
                                 "Use what an earlier run kept of the same scene, from whatever camera; do not train");
-  for (CLI::Option* option : app.get_options([](const CLI::Option* o) { return o->get_group() == "Training"; }))
+  for (CLI::Option* option : ofTraining())
     if (option != stored) stored->excludes(option);
   app.option_defaults()->group("Options");
 }
@@ -97,16 +107,30 @@ void declare(CLI::App& app, Options& options) {
       ->needs(record)
       ->capture_default_str();
   app.add_flag("--lenient", job.lenient, "Pass over what the reader does not know, with warnings");
-  declareTraining(app, job);
+  declareTraining(app, options);
   addDefinitions(app, job.definitions);
   addThreads(app, options.threads);
+}
+
+/// What an integrator has no use for is passed over, so that a script may give the same options to all of them.
+void noteUnused(const Options& options) {
+  std::vector<std::string> unused;
+  for (const CLI::Option* option : options.training) {
+    const bool used =
+        options.integrator == "product" || (options.integrator == "guided" && option->get_name() != "--shares");
+    if (option->count() > 0 && !used) unused.push_back(option->get_name());
+  }
+  if (!unused.empty())
+    printNote("loberender", fmt::format("{} has no use for {}", options.integrator, fmt::join(unused, ", ")));
 }
 
 void work(Options& options) {
   const auto name = std::ranges::find(kIntegratorNames, options.integrator);
   options.job.integrator = static_cast<IntegratorKind>(name - kIntegratorNames.begin());
+  options.job.training.learnShares = options.shares == "learnt";
   if (!options.size.empty()) options.job.size = parsePair("--size", options.size, 'x', "WIDTHxHEIGHT");
   if (!options.record.empty()) options.job.record = parsePair("--record", options.record, ',', "X,Y");
+  noteUnused(options);
   std::optional<oneapi::tbb::global_control> limit;
   if (options.threads > 0) limit.emplace(oneapi::tbb::global_control::max_allowed_parallelism, options.threads);
   run(options.job);

@@ -133,8 +133,8 @@ class PathLoop {
   int continuations(Path& path, const typename Sampler::Vertex& vertex) const {
     const std::optional<float> leaving =
         options_.termination == Termination::window ? vertex.reflectedRadiance() : std::nullopt;
-    if (!leaving) return survivesPlain(path) ? 1 : 0;
-    const float expected = luminance(path.throughput) * *leaving;
+    const float expected = leaving ? luminance(path.throughput) * *leaving : 0.0f;
+    if (!leaving || !std::isfinite(expected)) return survivesPlain(path) ? 1 : 0;
     if (path.promised <= 0) path.promised = expected;
     const float ratio = path.promised > 0 ? expected / path.promised : 1.0f;
     // So that every path ends.

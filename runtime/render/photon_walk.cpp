@@ -42,7 +42,7 @@ void PhotonWalk::advance(const EmittedPhoton& photon, Branch branch) {
   std::optional<GuidedSampler::Vertex> vertex;
   if (hit->bsdf->deltaProbability(hit->wo, hit->uv) < 1) {
     vertex.emplace(importance_, *hit);
-    if (!vertex->guided()) result_.requests.push_back({hit->position, normalTowards(*hit)});
+    if (!vertex->hasRecord()) result_.requests.push_back({hit->position, normalTowards(*hit)});
     store(photon, branch, *hit);
   }
   if (branch.depth == kMaxTrainingDepth) return;

@@ -324,7 +324,7 @@ void RenderJob::validate() const {
   require(!trainSeconds || !seconds || *trainSeconds < *seconds, "--train-seconds has to be less than --seconds");
   require(!passes || *passes >= 1, "--passes has to be at least 1");
   require(reference.empty() == convergence.empty(), "--reference and --convergence go together");
-  require(reduction >= 0 && std::isfinite(reduction), "--reduction has to be at least 0");
+  require(reduction >= 0 && std::isfinite(reduction), "--reduction has to be a finite number, at least 0");
   require(!outputs.empty(), "-o is missing");
   require(!record || integrator != IntegratorKind::path, "--record is for guided and product: path learns nothing");
   require(recordImage.extension() == ".png", "--record-image is written as .png");
@@ -338,7 +338,7 @@ void RenderJob::validate() const {
 
 std::string lobefitCommand(const RenderJob& job) {
   std::string command = fmt::format("lobefit {} -o {}", quoted(job.scene.string()), quoted(job.cacheFolder.string()));
-  for (const auto& [name, value] : job.definitions) command += " -D " + quoted(name + "=" + value);
+  for (const auto& [name, value] : job.definitions) command += fmt::format(" -D {}", quoted(fmt::format("{}={}", name, value)));
   if (job.lenient) command += " --lenient";
   return command;
 }
@@ -357,6 +357,11 @@ void run(const RenderJob& job) {
   if (stored) {
     const Stopwatch restoring;
     guiding.training = restoreIllumination(*stored, job.illumination, scene);
+    if (job.integrator == IntegratorKind::product && !guiding.training.report.learntShares)
+      printNote(kTool,
+                fmt::format("{}: its records have learnt no shares of the BSDF (trained by guided, or with --shares "
+                            "fixed): all have {:.1f}",
+                            job.illumination.string(), kProductShares.bsdf));
     load.restoring = restoring.seconds();
   }
   if (job.integrator == IntegratorKind::product)

@@ -23,13 +23,14 @@ std::string nameOf(TrainFrom from) {
   return std::ranges::find(names, from, [](const auto& entry) { return entry.second; })->first;
 }
 
-StoredTrainingSettings settingsOf(const TrainingPlan& plan, std::size_t passes) {
+StoredTrainingSettings settingsOf(const TrainingPlan& plan, const TrainingReport& report) {
   return {.from = nameOf(plan.from),
-          .passes = static_cast<std::uint32_t>(passes),
+          .passes = static_cast<std::uint32_t>(report.passes.size()),
           .photons = static_cast<std::uint32_t>(plan.photons),
           .importons = static_cast<std::uint32_t>(plan.importons),
           .components = static_cast<std::uint32_t>(plan.records.components),
-          .seed = plan.seed};
+          .seed = plan.seed,
+          .learntShares = report.learntShares};
 }
 
 }  // namespace
@@ -40,7 +41,7 @@ void saveIllumination(const std::filesystem::path& path, const TrainedIlluminati
   info.toolVersion = LOBE_VERSION;
   info.scene = nameOf(sceneFile);
   info.sceneHash = lightHash(scene);
-  info.settings = settingsOf(plan, trained.report.passes.size());
+  info.settings = settingsOf(plan, trained.report);
   info.particles = trained.report.particles();
   info.undersampledShare = trained.report.undersampledShare;
   const std::vector<std::byte> bytes = storeIllumination(trained.cache, std::move(info));
@@ -58,6 +59,7 @@ TrainedIllumination restoreIllumination(const IlluminationFile& file, const std:
   TrainedIllumination trained;
   trained.cache = loadIllumination(file);
   trained.report.undersampledShare = info.undersampledShare;
+  trained.report.learntShares = info.settings.learntShares;
   return trained;
 }
 

@@ -159,6 +159,7 @@ TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera&
   training.finish(static_cast<int>(report.passes.size()), sizes.last());
   report.seconds = watch.seconds();
   report.undersampledShare = training.radiance().undersampledShare();
+  report.learntShares = plan.learnShares && caches != nullptr;
   TrainedIllumination trained{training.radiance().cache(), report, {}};
   if (plan.keepParticles) trained.particles = training.takeParticles();
   return trained;

@@ -45,6 +45,7 @@ struct TrainingReport {
   std::vector<PassReport> passes;
   double seconds = 0;
   double undersampledShare = 0;
+  bool learntShares = false;  ///< records know how often the BSDF is to choose
 
   std::uint64_t particles() const;
 };
