@@ -338,7 +338,8 @@ void RenderJob::validate() const {
 
 std::string lobefitCommand(const RenderJob& job) {
   std::string command = fmt::format("lobefit {} -o {}", quoted(job.scene.string()), quoted(job.cacheFolder.string()));
-  for (const auto& [name, value] : job.definitions) command += fmt::format(" -D {}", quoted(fmt::format("{}={}", name, value)));
+  for (const auto& [name, value] : job.definitions)
+    command += fmt::format(" -D {}", quoted(fmt::format("{}={}", name, value)));
   if (job.lenient) command += " --lenient";
   return command;
 }
