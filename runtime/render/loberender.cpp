@@ -33,7 +33,7 @@ struct Options {
   RenderJob job;
   std::string size, record, integrator = "product", shares = "learnt";
   int threads = 0;
-  std::vector<const CLI::Option*> training;
+  std::vector<const CLI::Option*> training;  ///< options that only some integrators have a use for
 };
 
 /// --illumination goes with none of the options declared here.
