@@ -73,6 +73,14 @@ class Parameters {
   void note(std::string text) const { notes_.push_back(std::move(text)); }
   const std::vector<std::string>& notes() const { return notes_; }
 
+  /// A value that was not taken as it stands: the reader adds file, line and column of the parameter (of the element
+  /// when the name is empty). The text says what was found and what is used instead.
+  struct Warning {
+    std::string name, text;
+  };
+  void warn(std::string name, std::string text) const { warnings_.push_back({std::move(name), std::move(text)}); }
+  const std::vector<Warning>& warnings() const { return warnings_; }
+
  private:
   struct Entry {
     ParameterValue value;
@@ -84,6 +92,7 @@ class Parameters {
   std::map<std::string, Entry, std::less<>> entries_;
   mutable std::set<std::string, std::less<>> asked_;
   mutable std::vector<std::string> notes_;
+  mutable std::vector<Warning> warnings_;
   std::vector<BsdfPtr> children_;
 };
 

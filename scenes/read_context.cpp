@@ -9,8 +9,12 @@ namespace lobe {
 void ReadContext::unsupported(std::ptrdiff_t location, const std::string& kind, std::string_view message,
                               std::string_view consequence) {
   if (!options.lenient) file.fail(location, message);
+  warn(location, kind, fmt::format("{}: {}", message, consequence));
+}
+
+void ReadContext::warn(std::ptrdiff_t location, const std::string& kind, std::string_view message) {
   if (warnedKinds_.insert(kind).second)
-    scene.warnings.push_back(fmt::format("{}: {}: {}", file.where(location), message, consequence));
+    scene.warnings.push_back(fmt::format("{}: {}", file.where(location), message));
 }
 
 void ReadContext::note(std::string text) {

@@ -24,6 +24,10 @@ class ReadContext {
   void unsupported(std::ptrdiff_t location, const std::string& kind, std::string_view message,
                    std::string_view consequence);
 
+  /// Something that is read, but not as it stands there: a warning, the first time for each kind. The message says what
+  /// was found and what is done instead.
+  void warn(std::ptrdiff_t location, const std::string& kind, std::string_view message);
+
   /// What was read but replaced by something of ours; equal notes are kept once.
   void note(std::string text);
 

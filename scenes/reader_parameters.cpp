@@ -188,6 +188,15 @@ void noteUnused(ReadContext& context, pugi::xml_node node, const Parameters& par
   if (!names.empty()) context.note(fmt::format("{}: no effect of {}", describe(node), fmt::join(names, ", ")));
 }
 
+void passOnRemarks(ReadContext& context, pugi::xml_node node, const Parameters& parameters) {
+  for (const std::string& note : parameters.notes()) context.note(describe(node) + ": " + note);
+  for (const auto& [name, text] : parameters.warnings()) {
+    const std::ptrdiff_t location = parameters.location(name);
+    context.warn(location > 0 ? location : SceneFile::location(node), describe(node) + ": " + text,
+                 describe(node) + ": " + text);
+  }
+}
+
 std::string requiredText(const Parameters& parameters, const std::string& name) {
   if (!parameters.has(name)) throw ParameterError("", fmt::format("the parameter \"{}\" is needed", name));
   return parameters.text(name, "");

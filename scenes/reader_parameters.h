@@ -32,13 +32,16 @@ void checkUnused(ReadContext& context, pugi::xml_node node, const Parameters& pa
 /// Notes in one line what parameters the element has that nobody asked for: they have no effect.
 void noteUnused(ReadContext& context, pugi::xml_node node, const Parameters& parameters);
 
-/// make(parameters), its ParameterError put in its place and its notes passed on; afterwards checkUnused.
+/// Passes on what the makers of the element noted and warned of.
+void passOnRemarks(ReadContext& context, pugi::xml_node node, const Parameters& parameters);
+
+/// make(parameters), its ParameterError put in its place and its notes and warnings passed on; afterwards checkUnused.
 template <typename Make>
 auto makeFrom(ReadContext& context, pugi::xml_node node, const Parameters& parameters, Make&& make) {
   try {
     auto result = make(parameters);
     checkUnused(context, node, parameters);
-    for (const std::string& note : parameters.notes()) context.note(describe(node) + ": " + note);
+    passOnRemarks(context, node, parameters);
     return result;
   } catch (const ParameterError& error) {
     failAt(context, node, parameters, error);
