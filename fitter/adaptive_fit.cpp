@@ -6,11 +6,11 @@
 #include <cmath>
 #include <optional>
 
-#include <tbb/parallel_for.h>
 #include <Eigen/LU>
 
 #include "fitter/lobe_draws.h"
 #include "fitter/lobe_fit.h"
+#include "runtime/core/parallel.h"
 #include "runtime/mixture/lookup.h"
 
 namespace lobe {
@@ -160,7 +160,7 @@ class AdaptiveFitter {
     for (std::size_t begin = 0; begin < entries.size();) {
       const std::size_t end = std::min(entries.size(), std::max<std::size_t>(1, 2 * begin));
       std::vector<std::optional<Fit>> fitted(end - begin);
-      tbb::parallel_for(begin, end, [&](std::size_t i) {
+      parallelFor(begin, end, [&](std::size_t i) {
         fitted[i - begin] = fitWhereNeeded(entries[i]);
         if (advance) advance();
       });

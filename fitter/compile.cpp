@@ -7,11 +7,11 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "fitter/adaptive_fit.h"
 #include "fitter/cache_mixture.h"
 #include "fitter/lobe_fit.h"
+#include "runtime/core/parallel.h"
 #include "runtime/mixture/lookup.h"
 #include "schema/atomic_file.h"
 
@@ -165,8 +165,8 @@ FittedGrid fitEveryEntry(const Lobe& lobe, const DirectionGrid& grid, const FitS
                          const std::function<void()>& advance) {
   std::vector<FittedRecord> fitted(static_cast<std::size_t>(grid.count));
   const std::vector<std::vector<int>> chains = chainsOf(grid, settings);
-  tbb::parallel_for(std::size_t{0}, chains.size(),
-                    [&](std::size_t c) { fitChain(lobe, grid, chains[c], settings, fitted, advance); });
+  parallelFor(std::size_t{0}, chains.size(),
+              [&](std::size_t c) { fitChain(lobe, grid, chains[c], settings, fitted, advance); });
   FittedGrid result;
   for (std::uint32_t i = 0; i < fitted.size(); ++i) {
     result.append(fitted[i], i);

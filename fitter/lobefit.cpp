@@ -1,15 +1,19 @@
 // lobefit SCENE.xml [-o DIR]: compiles the lobes of a scene's materials into cache files.
 
+#include <algorithm>
 #include <chrono>
+#include <exception>
+#include <iterator>
 #include <optional>
 
 #include <fmt/format.h>
 #include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
 #include <nlohmann/json.hpp>
 
 #include "fitter/compile.h"
 #include "fitter/report.h"
+#include "runtime/core/parallel.h"
+#include "scenes/check_report.h"
 #include "scenes/reader.h"
 #include "scenes/tool.h"
 
@@ -23,6 +27,7 @@ struct Options {
   ReadOptions read;
   std::optional<float> quality, reduction;  // where given
   int threads = 0;
+  bool check = false;
   bool json = false;
 };
 
@@ -42,8 +47,9 @@ void declare(CLI::App& app, Options& o) {
                  "Not with auto: merge components while the sum of Runnalls' costs stays below this; 0 keeps all")
       ->default_str(fmt::format("{:g}", o.compile.settings.reduction));
   app.add_flag("--force", o.compile.force, "Fit again what is up to date");
-  app.add_flag("--lenient", o.read.lenient, "Replace what the scene reader does not know, with a warning");
-  app.add_flag("--json", o.json, "Print the table as JSON");
+  app.add_flag("--lenient", o.read.lenient, "Replace or leave out what is at fault in the scene, with warnings");
+  app.add_flag("--check", o.check, "Only read the scene's materials and print all that is found; exit 1 on faults");
+  app.add_flag("--json", o.json, "Print the table, or what --check finds, as JSON");
   addThreads(app, o.threads);
   addDefinitions(app, o.read.definitions);
 }
@@ -78,6 +84,21 @@ std::string withoutPath(const std::string& fault, const std::filesystem::path& p
   return fault.starts_with(start) ? fault.substr(start.size()) : fault;
 }
 
+CacheReport compileOne(const CompileJob& job, Progress& progress) {
+  const double seconds = job.upToDate ? 0 : secondsToRun(job, progress);
+  const LobeCache cache = LobeCache::open(job.path);
+  return {job.path, job.info.summary, job.use.materials, summarise(cache), job.upToDate, seconds};
+}
+
+/// The faults of the lobes that have no cache, as one line; the others are written.
+[[noreturn]] void failWith(const std::vector<std::string>& faults, std::size_t jobs) {
+  const std::size_t failed = faults.size();
+  std::string line = faults.front();
+  if (failed > 1) line += fmt::format(" (and {} more lobes failed)", failed - 1);
+  if (failed < jobs) line += fmt::format("; the other {} lobes are written", jobs - failed);
+  throw std::runtime_error(line);
+}
+
 std::vector<CacheReport> compileAll(const std::vector<CompileJob>& jobs) {
   double directions = 0;
   for (const CompileJob& job : jobs) {
@@ -87,13 +108,19 @@ std::vector<CacheReport> compileAll(const std::vector<CompileJob>& jobs) {
   }
   Progress progress("fitting", directions);
   std::vector<CacheReport> reports(jobs.size());
-  // Lobes beside each other, too: the first few directions of each have nothing to share cores with.
-  tbb::parallel_for(std::size_t{0}, jobs.size(), [&](std::size_t i) {
-    const CompileJob& job = jobs[i];
-    const double seconds = job.upToDate ? 0 : secondsToRun(job, progress);
-    const LobeCache cache = LobeCache::open(job.path);
-    reports[i] = {job.path, job.info.summary, job.use.materials, summarise(cache), job.upToDate, seconds};
+  std::vector<std::string> faultOf(jobs.size());
+  // Lobes are fitted in parallel, too, because the first few directions of each leave cores idle. An exception would
+  // cancel the others, so each lobe's is kept.
+  parallelFor(std::size_t{0}, jobs.size(), [&](std::size_t i) {
+    try {
+      reports[i] = compileOne(jobs[i], progress);
+    } catch (const std::exception& error) {
+      faultOf[i] = error.what();
+    }
   });
+  std::vector<std::string> faults;
+  std::ranges::copy_if(faultOf, std::back_inserter(faults), [](const std::string& fault) { return !fault.empty(); });
+  if (!faults.empty()) failWith(faults, jobs.size());
   return reports;
 }
 
@@ -140,6 +167,7 @@ void run(Options& o) {
   std::optional<tbb::global_control> limit;
   if (o.threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(o.threads));
   o.read.geometry = false;
+  if (o.check) return reportCheck(o.scene, o.read, o.json, stdout);
   const Scene scene = readScene(o.scene, o.read);
   for (const std::string& note : scene.notes) printNote("lobefit", note);
   for (const std::string& warning : scene.warnings) printWarning("lobefit", warning);

@@ -34,6 +34,8 @@ class Parameters {
  public:
   /// location: where the parameter stands in its file (an offset), handed back by unused() and location().
   void set(const std::string& name, ParameterValue value, std::ptrdiff_t location = 0);
+  /// As if it had never been given.
+  void erase(const std::string& name) { entries_.erase(name); }
   void addChild(BsdfPtr bsdf) { children_.push_back(std::move(bsdf)); }
 
   /// Of all names and values, textures by what they show. Not of the children, nor of file names, which say where

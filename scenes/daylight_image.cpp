@@ -4,9 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include <tbb/parallel_for.h>
-
 #include "materials/frame.h"
+#include "runtime/core/parallel.h"
 
 namespace lobe {
 namespace {
@@ -91,7 +90,7 @@ class SunPainter {
 
 Environment bakeDaylight(const DaylightParts& parts, const Eigen::Matrix3d& toWorld, int width) {
   Image image(width, width / 2);
-  tbb::parallel_for(0, image.height, [&](int y) {
+  parallelFor(0, image.height, [&](int y) {
     for (int x = 0; x < image.width; ++x) {
       const Eigen::Vector3d local = fromAngles(kPiD * (y + 0.5) / image.height, 2 * kPiD * (x + 0.5) / image.width);
       for (const SkyDome& dome : parts.skies) image.at(x, y) += radianceOf(dome, toWorld * local);

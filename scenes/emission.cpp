@@ -37,7 +37,7 @@ double emissionScale(const Parameters& parameters, const char* name, double fall
 void noteSamplingWeight(ReadContext& context, pugi::xml_node node, const Parameters& parameters) {
   if (!parameters.has("sampling_weight")) return;
   parameters.number("sampling_weight", 1.0);
-  context.note(fmt::format("{}: no effect of sampling_weight", describe(node)));
+  context.findings.noteWithoutEffect(describe(node), "sampling_weight");
 }
 
 }  // namespace lobe

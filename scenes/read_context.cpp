@@ -8,17 +8,21 @@ namespace lobe {
 
 void ReadContext::unsupported(std::ptrdiff_t location, const std::string& kind, std::string_view message,
                               std::string_view consequence) {
-  if (!options.lenient) file.fail(location, message);
-  warn(location, kind, fmt::format("{}: {}", message, consequence));
+  findings.fault(file.where(location), kind, std::string(message), std::string(consequence));
 }
 
 void ReadContext::warn(std::ptrdiff_t location, const std::string& kind, std::string_view message) {
-  if (warnedKinds_.insert(kind).second)
-    scene.warnings.push_back(fmt::format("{}: {}", file.where(location), message));
+  findings.warn(file.where(location), kind, std::string(message));
 }
 
-void ReadContext::note(std::string text) {
-  if (std::ranges::find(scene.notes, text) == scene.notes.end()) scene.notes.push_back(std::move(text));
+bool ReadContext::attempt(const std::string& consequence, const std::function<void()>& read) {
+  try {
+    read();
+    return true;
+  } catch (const SceneError& error) {
+    for (const Fault& fault : error.faults()) findings.fault(fault.where, fault.message, fault.message, consequence);
+    return false;
+  }
 }
 
 std::string typeOf(const ReadContext& context, pugi::xml_node node) {
@@ -50,8 +54,9 @@ void rejectText(const ReadContext& context, pugi::xml_node node) {
                     fmt::format("text \"{}\" where an element is needed", word));
 }
 
-void noteMedium(ReadContext& context) {
-  context.note("media are left out: the inside of shapes is clear");
+void rejectMedium(ReadContext& context, pugi::xml_node node) {
+  context.unsupported(node, "medium", "participating media are not rendered",
+                      "the medium is left out and space is clear");
 }
 
 pugi::xml_node resolveReference(const ReadContext& context, pugi::xml_node ref) {

@@ -1,7 +1,7 @@
 #pragma once
 // What all parts of the reader share: the file, the options, and where findings go.
 
-#include <set>
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -12,11 +12,11 @@ namespace lobe {
 
 class ReadContext {
  public:
-  ReadContext(const SceneFile& sceneFile, const ReadOptions& readOptions, Scene& result)
-      : file(sceneFile), options(readOptions), scene(result) {}
+  ReadContext(const SceneFile& sceneFile, const ReadOptions& readOptions, Scene& result, Findings& found)
+      : file(sceneFile), options(readOptions), scene(result), findings(found) {}
 
-  /// Something not known or not there: throws SceneError, or with --lenient notes a warning, the first time for each
-  /// kind, and returns. The message says what is known; consequence says what happens instead ("a grey one is used").
+  /// Something wrong or not known: reading goes on, so that all faults are found in one run. The message says what is
+  /// known; consequence says what lenient reading makes of it ("a grey one is used").
   void unsupported(pugi::xml_node node, const std::string& kind, std::string_view message,
                    std::string_view consequence) {
     unsupported(SceneFile::location(node), kind, message, consequence);
@@ -29,14 +29,15 @@ class ReadContext {
   void warn(std::ptrdiff_t location, const std::string& kind, std::string_view message);
 
   /// What was read but replaced by something of ours; equal notes are kept once.
-  void note(std::string text);
+  void note(std::string text) { findings.note(std::move(text)); }
+
+  /// Runs read. A SceneError that it throws becomes a fault with this consequence. Returns whether there was none.
+  bool attempt(const std::string& consequence, const std::function<void()>& read);
 
   const SceneFile& file;
   const ReadOptions& options;
   Scene& scene;
-
- private:
-  std::set<std::string> warnedKinds_;
+  Findings& findings;
 };
 
 /// The type attribute; fails when there is none.
@@ -51,8 +52,8 @@ std::string_view elementName(pugi::xml_node node);
 /// Fails when the node is text, at its first word: scene files keep everything in attributes.
 void rejectText(const ReadContext& context, pugi::xml_node node);
 
-/// Notes that participating media are not rendered.
-void noteMedium(ReadContext& context);
+/// A fault: participating media are not rendered.
+void rejectMedium(ReadContext& context, pugi::xml_node node);
 
 /// The target of a <ref>; fails when there is no such id.
 pugi::xml_node resolveReference(const ReadContext& context, pugi::xml_node ref);

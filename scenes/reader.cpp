@@ -17,7 +17,8 @@ namespace {
 constexpr std::string_view kKnown =
     "alias, bsdf, default, emitter, film, include, integrator, medium, path, rfilter, sampler, sensor, shape, texture";
 /// Nothing to read where they stand: SceneFile has seen to them, or something may refer to them.
-constexpr std::array<std::string_view, 6> kElsewhere = {"alias", "default", "film", "path", "rfilter", "sampler"};
+constexpr std::array<std::string_view, 7> kElsewhere = {"alias", "default", "film",   "medium",
+                                                        "path",  "rfilter", "sampler"};
 
 class SceneReader {
  public:
@@ -29,14 +30,17 @@ class SceneReader {
         emitters_(context, textures_) {}
 
   void read() {
-    for (const pugi::xml_node node : context_.file.scene().children()) readElement(node);
-    if (!sensor_ && context_.options.geometry) context_.file.fail(context_.file.scene(), "the scene has no <sensor>");
+    for (const pugi::xml_node node : context_.file.scene().children())
+      context_.attempt(fmt::format("{} is left out", describe(node)), [&] { readElement(node); });
+    if (!sensor_ && context_.options.geometry)
+      context_.unsupported(context_.file.scene(), "no sensor", "the scene has no <sensor>", "");
     emitters_.finish();
     if (context_.options.geometry) shapes_.readMeshes();
   }
 
  private:
   void readElement(pugi::xml_node node) {
+    if (SceneFile::hasUndefinedName(node)) return;
     const std::string_view tag = elementName(node);
     if (tag == "shape")
       shapes_.add(node);
@@ -50,8 +54,6 @@ class SceneReader {
       readFirstSensor(node);
     else if (tag == "integrator")
       readIntegrator(context_, node);
-    else if (tag == "medium")
-      noteMedium(context_);
     else if (std::ranges::find(kElsewhere, tag) == kElsewhere.end())
       reject(node);
   }
@@ -59,14 +61,15 @@ class SceneReader {
   void readFirstSensor(pugi::xml_node node) {
     if (sensor_) return context_.note("only the first of several sensors is used");
     sensor_ = true;
-    readSensor(context_, node);
+    // Without a camera there is no picture: lenient reading does not get past its faults.
+    context_.attempt("", [&] { readSensor(context_, node); });
   }
 
   void reject(pugi::xml_node node) {
     rejectText(context_, node);
     context_.unsupported(node, fmt::format("<{}> in scene", node.name()),
                          fmt::format("unknown element <{}>; {}", node.name(), knownAre(node.name(), kKnown)),
-                         "it is left out");
+                         fmt::format("<{}> is left out", node.name()));
   }
 
   ReadContext& context_;
@@ -77,14 +80,53 @@ class SceneReader {
   bool sensor_ = false;
 };
 
+Scene read(const std::filesystem::path& path, const ReadOptions& options, Findings& findings) {
+  const SceneFile file(path, options.definitions, findings);
+  Scene scene;
+  ReadContext context(file, options, scene, findings);
+  SceneReader(context).read();
+  return scene;
+}
+
+/// Whether what was read of a scene with these faults may not be used.
+bool mustRefuse(const std::vector<Fault>& faults, const Scene& scene, const ReadOptions& options) {
+  if (faults.empty()) return false;
+  const bool nothingLeft = options.geometry && scene.shapes.empty() && !scene.environment;
+  return !options.lenient || nothingLeft ||
+         std::ranges::any_of(faults, [](const Fault& fault) { return fault.consequence.empty(); });
+}
+
+std::string asWarning(const Fault& fault) {
+  const std::string more = fault.count > 1 ? fmt::format(" ({} more of this kind)", fault.count - 1) : "";
+  return fmt::format("{}: {}: {}{}", fault.where, fault.message, fault.consequence, more);
+}
+
 }  // namespace
 
 Scene readScene(const std::filesystem::path& path, const ReadOptions& options) {
-  const SceneFile file(path, options.definitions);
-  Scene scene;
-  ReadContext context(file, options, scene);
-  SceneReader(context).read();
+  Findings findings;
+  Scene scene = read(path, options, findings);
+  if (mustRefuse(findings.faults(), scene, options)) throw SceneError(findings.faults());
+  scene.warnings = findings.warnings();
+  for (const Fault& fault : findings.faults()) scene.warnings.push_back(asWarning(fault));
+  scene.notes = findings.notes();
   return scene;
+}
+
+SceneCheck checkScene(const std::filesystem::path& path, const ReadOptions& options) {
+  Findings findings;
+  SceneCheck check;
+  try {
+    const Scene scene = read(path, options, findings);
+    check.faults = findings.faults();
+    check.readable = !mustRefuse(check.faults, scene, options);
+  } catch (const SceneError& error) {
+    check.faults = findings.faults();
+    check.faults.insert(check.faults.end(), error.faults().begin(), error.faults().end());
+  }
+  check.warnings = findings.warnings();
+  check.notes = findings.notes();
+  return check;
 }
 
 }  // namespace lobe

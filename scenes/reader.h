@@ -4,24 +4,18 @@
 #include <filesystem>
 #include <functional>
 #include <map>
-#include <stdexcept>
 #include <string>
+#include <vector>
 
+#include "scenes/findings.h"
 #include "scenes/scene.h"
 
 namespace lobe {
 
-/// A fault in a scene file; what() is one line, "FILE:LINE:COLUMN: message", and says what is known or expected
-/// instead.
-class SceneError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
-
 struct ReadOptions {
   /// Values for $name, over the file's <default>s.
   std::map<std::string, std::string> definitions;
-  /// Replace what is not known by something plain and warn (once per kind) instead of failing.
+  /// Leave out or replace what is at fault and warn (once per kind) instead of failing.
   bool lenient = false;
   /// false: materials only, no meshes or environment (the fitter's need).
   bool geometry = true;
@@ -29,7 +23,18 @@ struct ReadOptions {
   std::function<void(double)> onProgress = {};
 };
 
-/// Throws SceneError. Meshes are read in parallel with oneTBB.
+/// Reads the whole file before it throws SceneError with all faults found; with options.lenient only when nothing is
+/// left to draw. Meshes are read in parallel with oneTBB.
 Scene readScene(const std::filesystem::path& path, const ReadOptions& options = {});
+
+/// What readScene finds in a file.
+struct SceneCheck {
+  std::vector<Fault> faults;  ///< also those that options.lenient gets past
+  std::vector<std::string> warnings, notes;
+  bool readable = false;  ///< readScene with the same options does not throw
+};
+
+/// Reads as readScene does, and returns all that it finds. Throws only what is not the file's fault.
+SceneCheck checkScene(const std::filesystem::path& path, const ReadOptions& options = {});
 
 }  // namespace lobe

@@ -87,33 +87,36 @@ bool DaylightReader::read(pugi::xml_node node, const Parameters& parameters, con
   const double scale = emissionScale(parameters, "scale", 1);
   const Eigen::Vector3d sun = readSunDirection(parameters, toWorld);
   checkAboveHorizon(parameters, sun);
+  const int width = integer(parameters, "resolution", 1024, 8, 1 << 14);
+  const double skyScale = type == "sunsky" ? emissionScale(parameters, "sky_scale", scale) : scale;
+  const double sunScale = type == "sunsky" ? emissionScale(parameters, "sun_scale", scale) : scale;
+  const double largest = 90 * std::numbers::pi / 180 / sunRadius();
+  const double radius =
+      type == "sky" ? 0 : within(parameters, "sun_radius_scale", 1, 0, std::floor(largest)) * sunRadius();
+  if (type != "sun" && parameters.has("albedo")) {
+    parameters.colour("albedo", Rgb::Zero());
+    context_.note(fmt::format("{}: no effect of albedo, Preetham's model has none", describe(node)));
+  }
+  // Nothing is kept before everything has been read: what throws is read again.
   if (!any()) frame_ = toWorld;
-  width_ = std::max(width_, integer(parameters, "resolution", 1024, 8, 1 << 14));
+  width_ = std::max(width_, width);
   if (type != "sun") {
-    const double skyScale = type == "sunsky" ? emissionScale(parameters, "sky_scale", scale) : scale;
     if (turbidity < PreethamSky::kLowestTurbidity)
       context_.note(fmt::format("{}: a sky of turbidity {} is that of {}, the lowest that Preetham's model has",
                                 describe(node), turbidity, PreethamSky::kLowestTurbidity));
     const double clearest = std::max(turbidity, PreethamSky::kLowestTurbidity);
     parts_.skies.push_back({PreethamSky(clearest, sun), toWorld, skyScale, stretch});
-    if (parameters.has("albedo")) {
-      parameters.colour("albedo", Rgb::Zero());
-      context_.note(fmt::format("{}: no effect of albedo, Preetham's model has none", describe(node)));
-    }
   }
   if (type != "sky") {
-    const double sunScale = type == "sunsky" ? emissionScale(parameters, "sun_scale", scale) : scale;
     const Rgb radiance = sunRadiance(turbidity, std::acos(std::min(1.0, sun.y()))) * static_cast<float>(sunScale);
-    addSun(parameters, toWorld * stretched(sun, stretch), radiance);
+    addSun(toWorld * stretched(sun, stretch), radiance, radius);
   }
   return true;
 }
 
-void DaylightReader::addSun(const Parameters& parameters, const Eigen::Vector3d& world, const Rgb& radiance) {
+void DaylightReader::addSun(const Eigen::Vector3d& world, const Rgb& radiance, double radius) {
   const double sine = std::sin(0.5 * sunRadius());
   const Rgb irradiance = radiance * static_cast<float>(4 * std::numbers::pi * sine * sine);
-  const double largest = 90 * std::numbers::pi / 180 / sunRadius();
-  const double radius = within(parameters, "sun_radius_scale", 1, 0, std::floor(largest)) * sunRadius();
   if (radius > 0)
     parts_.suns.push_back({world, irradiance, radius});
   else if (context_.options.geometry)

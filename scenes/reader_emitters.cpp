@@ -27,7 +27,8 @@ std::optional<Environment> makeFromImage(ReadContext& context, TextureReader& te
   const auto scale = static_cast<float>(emissionScale(parameters, "scale", 1.0));
   imageRequest(context, parameters);  // checks and uses its parameters, whether or not the image is wanted
   if (!context.options.geometry) return std::nullopt;
-  const std::shared_ptr<const Image> image = textures.images().get(context, node, parameters, "it is left out");
+  const std::shared_ptr<const Image> image =
+      textures.images().get(context, node, parameters, "the emitter is left out");
   if (!image) return std::nullopt;
   environment.radiance = *withoutFaults(context, node, parameters, image, Sign::positive);
   for (Rgb& pixel : environment.radiance.pixels) pixel *= scale;
@@ -91,7 +92,7 @@ Parameters readEmitterParameters(ReadContext& context, pugi::xml_node node, cons
   const auto refuseTexture = [&](pugi::xml_node child, const std::string&, Parameters&) {
     if (type != "spot" || elementName(child) != "texture") return false;
     context.unsupported(child, "texture of a spot", "a spot's texture is not supported: it shines evenly",
-                        "it is left out");
+                        "the texture is left out");
     return true;
   };
   Parameters parameters = readParameters(context, node, "", refuseTexture);
@@ -111,7 +112,7 @@ void EmitterReader::add(pugi::xml_node node) {
     context_.unsupported(node, "emitter " + type,
                          fmt::format("unknown emitter type \"{}\"; {}", type,
                                      knownAre(type, fmt::format("{}", fmt::join(kTypes, ", ")))),
-                         "it is left out");
+                         "the emitter is left out");
     return;
   }
   const Parameters parameters = readEmitterParameters(context_, node, type);

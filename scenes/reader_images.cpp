@@ -4,8 +4,8 @@
 #include <exception>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
+#include "runtime/core/parallel.h"
 #include "scenes/reader_parameters.h"
 #include "scenes/values.h"
 
@@ -24,7 +24,7 @@ std::optional<ImageRequest> peek(const ReadContext& context, pugi::xml_node node
   for (const pugi::xml_node child : node.children()) {
     const std::string name = normalisedName(child.attribute("name").value());
     const char* value = child.attribute("value").value();
-    if (name == "filename") parameters.set(name, std::string(value));
+    if (name == "filename") parameters.set(name, std::string(value), SceneFile::location(child));
     if (const std::optional<bool> raw = parseBoolean(value); raw && name == "raw") parameters.set(name, *raw);
     if (const std::optional<double> gamma = parseNumber(value); gamma && name == "gamma") parameters.set(name, *gamma);
   }
@@ -61,7 +61,8 @@ Encoding encodingOf(const Parameters& parameters) {
 }  // namespace
 
 ImageRequest imageRequest(const ReadContext& context, const Parameters& parameters) {
-  return {context.file.resolve(requiredText(parameters, "filename")), encodingOf(parameters)};
+  return {context.file.resolve(requiredText(parameters, "filename"), parameters.location("filename")),
+          encodingOf(parameters)};
 }
 
 std::shared_ptr<const Image> withoutFaults(ReadContext& context, pugi::xml_node node, const Parameters& parameters,
@@ -84,7 +85,7 @@ ImageStore::ImageStore(const ReadContext& context) {
   for (const ImageRequest& request : requests)
     if (const auto [entry, isNew] = entries_.try_emplace(keyOf(request)); isNew)
       reads.emplace_back(request, &entry->second);
-  tbb::parallel_for(std::size_t{0}, reads.size(), [&](std::size_t i) { *reads[i].second = read(reads[i].first); });
+  parallelFor(std::size_t{0}, reads.size(), [&](std::size_t i) { *reads[i].second = read(reads[i].first); });
 }
 
 ImageStore::Key ImageStore::keyOf(const ImageRequest& request) {

@@ -49,10 +49,15 @@ MaterialReader::Made MaterialReader::makeDiffuseOf(float reflectance) {
 
 const MaterialReader::Made& MaterialReader::done(pugi::xml_node node) {
   const auto [entry, isNew] = done_.try_emplace(SceneFile::location(node));
-  if (isNew)
-    entry->second = make(node);
-  else if (!entry->second.bsdf)
-    context_.file.fail(node, "a bsdf that refers to itself");
+  if (isNew) {
+    Made made;
+    if (!context_.attempt("diffuse 0.5 is used", [&] { made = make(node); })) made = makeDiffuseOf(0.5f);
+    entry->second = std::move(made);
+  } else if (!entry->second.bsdf) {
+    context_.unsupported(node, fmt::format("circle at {}", SceneFile::location(node)), "a bsdf that refers to itself",
+                         "diffuse 0.5 is used in it");
+    return circular_;
+  }
   return entry->second;
 }
 
@@ -87,8 +92,8 @@ MaterialReader::Made MaterialReader::make(pugi::xml_node node) {
 
 bool MaterialReader::resolveFile(pugi::xml_node node, Parameters& parameters) {
   if (!parameters.holdsText("filename")) return true;  // the model says what is wrong
-  const std::filesystem::path path = context_.file.resolve(parameters.text("filename", ""));
   const std::ptrdiff_t location = parameters.location("filename");
+  const std::filesystem::path path = context_.file.resolve(parameters.text("filename", ""), location);
   if (!std::filesystem::exists(path)) {
     context_.unsupported(location, "missing file " + path.string(),
                          fmt::format("{}: {} is not there", describe(node), path.string()), "diffuse 0.5 is used");

@@ -15,7 +15,7 @@ class MaterialReader {
   /// that measured materials, whose files are large and need not be there, are left until something uses them.
   void check(pugi::xml_node node);
 
-  /// Each element is read once. Throws SceneError.
+  /// Each element is read once; what cannot be read is a fault, and diffuse 0.5.
   BsdfPtr read(pugi::xml_node node) { return done(node).bsdf; }
 
   /// The index in Scene::materials of the element's BSDF, which is added when it is the first use.
@@ -37,7 +37,8 @@ class MaterialReader {
 
   ReadContext& context_;
   TextureReader& textures_;
-  std::map<std::ptrdiff_t, Made> done_;      // by place
+  std::map<std::ptrdiff_t, Made> done_;      // by place; without a BSDF while being read
+  Made circular_ = makeDiffuseOf(0.5f);      // stands for a BSDF inside itself
   std::map<std::ptrdiff_t, int> materials_;  // by place; the defaults at −1 and −2
   int unnamed_ = 0;
 };

@@ -23,7 +23,9 @@ constexpr std::string_view kValueElements =
 
 constexpr std::array<std::string_view, 6> kColours = {"rgb", "srgb", "color", "xyz", "spectrum", "blackbody"};
 
-/// What Mitsuba has and we need not: how it stores or filters things, and what belongs to other ways to render.
+/// Parameters of Mitsuba's that do not change what a picture converges to: how things are stored and found, and what
+/// belongs to other integrators, to files that we do not write, or to motion, which we do not read. An element without
+/// a type stands for all its types; * stands for all names.
 constexpr std::pair<std::string_view, std::string_view> kWithoutEffect[] = {
     {"texture \"bitmap\"", "accel, cache, format, max_anisotropy"},
     {"emitter \"constant\"", "to_world"},
@@ -31,17 +33,21 @@ constexpr std::pair<std::string_view, std::string_view> kWithoutEffect[] = {
     {"emitter \"sky\"", "extend"},
     {"emitter \"sunsky\"", "complex_sun, extend, sun_aperture"},
     {"bsdf \"normalmap\"", "flip_invalid_normals, use_shadowing_function"},
-    {"sensor \"orthographic\"", "shutter_close, shutter_open"},
-    {"sensor \"perspective\"", "shutter_close, shutter_open"},
-    {"sensor \"thinlens\"", "shutter_close, shutter_open"},
+    {"film",
+     "attach_log, banner, burn, channel_names, component_format, compression, digits, exposure, file_format, filename, "
+     "gamma, has_alpha, high_quality_edges, key, pixel_format, sample_border, tonemap_method, variable"},
+    {"integrator", "*"},
+    {"sensor", "shutter_close, shutter_open"},
     {"shape \"obj\"", "load_materials, shape_index"},
     {"shape \"ply\"", "srgb"},
 };
 
 bool hasNoEffect(const std::string& owner, std::string_view name) {
+  const std::string_view tag = std::string_view(owner).substr(0, owner.find(' '));
   for (const auto& [element, names] : kWithoutEffect)
-    if (element == owner && fmt::format(", {}, ", names).find(fmt::format(", {}, ", name)) != std::string::npos)
-      return true;
+    if (element == owner || element == tag)
+      if (names == "*" || fmt::format(", {}, ", names).find(fmt::format(", {}, ", name)) != std::string::npos)
+        return true;
   return false;
 }
 
@@ -77,7 +83,8 @@ std::optional<Rgb> parseSpectrumOrColour(std::string_view text) {
 }
 
 Rgb readSpectrumFile(const ReadContext& context, pugi::xml_node node) {
-  const std::filesystem::path path = context.file.resolve(node.attribute("filename").value());
+  const std::filesystem::path path =
+      context.file.resolve(node.attribute("filename").value(), SceneFile::location(node));
   try {
     if (const std::optional<SpectrumPoints> points = parseSpectrumFile(readBytes(path))) return rgbOfSpectrum(*points);
   } catch (const std::runtime_error& error) {
@@ -126,36 +133,41 @@ std::optional<ParameterValue> readValue(ReadContext& context, pugi::xml_node nod
   return std::nullopt;
 }
 
-void setValue(const ReadContext& context, pugi::xml_node node, ParameterValue value, Parameters& parameters) {
+void setValue(ReadContext& context, pugi::xml_node node, ParameterValue value, Parameters& parameters) {
   const pugi::xml_attribute name = node.attribute("name");
   if (!name) context.file.fail(node, fmt::format("<{}> needs a name", node.name()));
   const std::string key = normalisedName(name.value());
-  if (parameters.contains(key))
-    context.file.fail(node, fmt::format("the parameter \"{}\" is given twice", name.value()));
+  if (parameters.contains(key)) warnOfRepetition(context, node, name.value());
   parameters.set(key, std::move(value), SceneFile::location(node));
 }
 
 }  // namespace
 
+void warnOfRepetition(ReadContext& context, pugi::xml_node node, const std::string& name) {
+  const std::string message = fmt::format("the parameter \"{}\" is given twice: the last one is used", name);
+  context.warn(SceneFile::location(node), message, message);
+}
+
 Parameters readParameters(ReadContext& context, pugi::xml_node node, const std::string& knownChildren,
                           const ChildHandler& onChild) {
   Parameters parameters;
-  for (const pugi::xml_node child : node.children()) {
+  const auto read = [&](pugi::xml_node child) {
+    if (SceneFile::hasUndefinedName(child)) return;
     rejectText(context, child);
-    if (std::optional<ParameterValue> value = readValue(context, child)) {
-      setValue(context, child, std::move(*value), parameters);
-      continue;
-    }
+    if (std::optional<ParameterValue> value = readValue(context, child))
+      return setValue(context, child, std::move(*value), parameters);
     const bool isReference = std::string_view(child.name()) == "ref";
     const pugi::xml_node target = isReference ? resolveReference(context, child) : child;
-    if (onChild(target, child.attribute("name").value(), parameters)) continue;
+    if (onChild(target, child.attribute("name").value(), parameters)) return;
     context.unsupported(
         child, fmt::format("<{}> in {}", target.name(), describe(node)),
         fmt::format("unknown element <{}> in {}; {}", target.name(), describe(node),
                     knownAre(target.name(),
                              fmt::format("{}{}{}", kValueElements, knownChildren.empty() ? "" : ", ", knownChildren))),
-        "it is left out");
-  }
+        fmt::format("<{}> is left out", target.name()));
+  };
+  for (const pugi::xml_node child : node.children())
+    context.attempt(fmt::format("this <{}> is ignored", child.name()), [&] { read(child); });
   return parameters;
 }
 
@@ -163,29 +175,40 @@ Parameters readParameters(ReadContext& context, pugi::xml_node node) {
   return readParameters(context, node, "", [](pugi::xml_node, const std::string&, Parameters&) { return false; });
 }
 
-void failAt(const ReadContext& context, pugi::xml_node node, const Parameters& parameters,
-            const ParameterError& error) {
-  const std::ptrdiff_t location = parameters.location(error.name);
-  context.file.fail(location > 0 ? location : SceneFile::location(node),
-                    fmt::format("{}: {}", describe(node), error.what()));
+void RefusedParameters::erase(ReadContext& context, pugi::xml_node node, Parameters& parameters,
+                              const ParameterError& error) {
+  const std::string message = fmt::format("{}: {}", describe(node), error.what());
+  if (parameters.contains(error.name)) {
+    all_.push_back({error.name, message, parameters.location(error.name)});
+    parameters.erase(error.name);
+    return;
+  }
+  if (all_.empty()) context.file.fail(node, message);
+  const Refused last = std::move(all_.back());
+  all_.pop_back();
+  report(context);
+  context.file.fail(last.location, last.message);
+}
+
+void RefusedParameters::report(ReadContext& context) const {
+  for (const Refused& refused : all_)
+    context.unsupported(refused.location, refused.message, refused.message, fmt::format("{} is ignored", refused.name));
 }
 
 void checkUnused(ReadContext& context, pugi::xml_node node, const Parameters& parameters) {
   const std::string owner = describe(node);
   for (const std::string& name : parameters.unused()) {
+    const std::ptrdiff_t location = parameters.location(name);
+    const std::string kind = fmt::format("{} of {}", name, owner);
+    const std::string known = knownAre(name, fmt::format("{}", fmt::join(parameters.asked(), ", ")));
+    const std::string message = fmt::format("unknown parameter \"{}\" of {}; {}", name, owner, known);
     if (hasNoEffect(owner, name))
-      context.note(fmt::format("{}: no effect of {}", owner, name));
+      context.findings.noteWithoutEffect(owner, name);
+    else if (context.file.isOfToday())
+      context.unsupported(location, kind, message, fmt::format("{} is ignored", name));
     else
-      context.unsupported(parameters.location(name), fmt::format("{} of {}", name, owner),
-                          fmt::format("unknown parameter \"{}\" of {}; {}", name, owner,
-                                      knownAre(name, fmt::format("{}", fmt::join(parameters.asked(), ", ")))),
-                          "it is ignored");
+      context.warn(location, kind, message + ": it is ignored");
   }
-}
-
-void noteUnused(ReadContext& context, pugi::xml_node node, const Parameters& parameters) {
-  const std::vector<std::string> names = parameters.unused();
-  if (!names.empty()) context.note(fmt::format("{}: no effect of {}", describe(node), fmt::join(names, ", ")));
 }
 
 void passOnRemarks(ReadContext& context, pugi::xml_node node, const Parameters& parameters) {

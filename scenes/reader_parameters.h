@@ -4,6 +4,8 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "materials/parameters.h"
 #include "scenes/read_context.h"
@@ -22,29 +24,49 @@ Parameters readParameters(ReadContext& context, pugi::xml_node node, const std::
 /// The same for elements without other children.
 Parameters readParameters(ReadContext& context, pugi::xml_node node);
 
-/// Throws SceneError at the parameter that the error names, or else at the element.
-[[noreturn]] void failAt(const ReadContext& context, pugi::xml_node node, const Parameters& parameters,
-                         const ParameterError& error);
+/// Warns that a parameter is given again at this element: the last one is used.
+void warnOfRepetition(ReadContext& context, pugi::xml_node node, const std::string& name);
 
-/// Complains about every parameter that nobody asked for; notes those which may be there but have no effect here.
+/// A fault for every parameter that nobody asked for, or a warning in files below version 2, whose renderer ignores
+/// them; a note for those that do not change the picture.
 void checkUnused(ReadContext& context, pugi::xml_node node, const Parameters& parameters);
-
-/// Notes in one line what parameters the element has that nobody asked for: they have no effect.
-void noteUnused(ReadContext& context, pugi::xml_node node, const Parameters& parameters);
 
 /// Passes on what the makers of the element noted and warned of.
 void passOnRemarks(ReadContext& context, pugi::xml_node node, const Parameters& parameters);
 
-/// make(parameters), its ParameterError put in its place and its notes and warnings passed on; afterwards checkUnused.
+/// Parameters that a model refuses, one after the other.
+class RefusedParameters {
+ public:
+  /// Erases the parameter that the error names. Throws SceneError when it names none that is there: the element itself is
+  /// refused, for the last parameter's sake if there was one.
+  void erase(ReadContext& context, pugi::xml_node node, Parameters& parameters, const ParameterError& error);
+  /// A fault for each.
+  void report(ReadContext& context) const;
+
+ private:
+  struct Refused {
+    std::string name, message;
+    std::ptrdiff_t location;
+  };
+  std::vector<Refused> all_;
+};
+
+/// make(parameters), with its notes and warnings passed on; afterwards checkUnused. A parameter that make refuses by a
+/// ParameterError is a fault, and make is called again without it, so that it must leave nothing behind when it throws.
+/// SceneError: the element itself is refused.
 template <typename Make>
-auto makeFrom(ReadContext& context, pugi::xml_node node, const Parameters& parameters, Make&& make) {
-  try {
-    auto result = make(parameters);
-    checkUnused(context, node, parameters);
-    passOnRemarks(context, node, parameters);
-    return result;
-  } catch (const ParameterError& error) {
-    failAt(context, node, parameters, error);
+auto makeFrom(ReadContext& context, pugi::xml_node node, Parameters parameters, Make&& make) {
+  RefusedParameters refused;
+  for (;;) {
+    try {
+      auto result = make(std::as_const(parameters));
+      refused.report(context);
+      checkUnused(context, node, parameters);
+      passOnRemarks(context, node, parameters);
+      return result;
+    } catch (const ParameterError& error) {
+      refused.erase(context, node, parameters, error);
+    }
   }
 }
 

@@ -46,7 +46,10 @@ PixelFilter makeFilter(const std::string& type, const Parameters& parameters) {
 void readFilter(ReadContext& context, pugi::xml_node node) {
   const std::string type = typeOf(context, node);
   if (std::ranges::find(kFilters, type) == kFilters.end()) {
-    context.note(fmt::format("rfilter \"{}\" is replaced by gaussian (known are {})", type, fmt::join(kFilters, ", ")));
+    context.unsupported(node, "rfilter " + type,
+                        fmt::format("unknown rfilter type \"{}\"; {}", type,
+                                    knownAre(type, fmt::format("{}", fmt::join(kFilters, ", ")))),
+                        "a Gaussian filter is used");
     return;
   }
   const Parameters parameters = readParameters(context, node);
@@ -63,17 +66,24 @@ int readPixels(const Parameters& parameters, const char* name, int fallback, int
 
 constexpr std::array<const char*, 4> kCropParameters = {"crop_offset_x", "crop_offset_y", "crop_width", "crop_height"};
 
-void readSize(const Parameters& parameters, Camera& camera) {
+struct FilmSize {
+  int width, height;
+  std::optional<FilmCrop> crop;
+};
+
+FilmSize readSize(const Parameters& parameters, const Camera& camera) {
   constexpr int kLargest = 1 << 16;
-  camera.width = readPixels(parameters, "width", camera.width, 1, kLargest);
-  camera.height = readPixels(parameters, "height", camera.height, 1, kLargest);
-  if (std::ranges::none_of(kCropParameters, [&](const char* name) { return parameters.has(name); })) return;
+  FilmSize size;
+  size.width = readPixels(parameters, "width", camera.width, 1, kLargest);
+  size.height = readPixels(parameters, "height", camera.height, 1, kLargest);
+  if (std::ranges::none_of(kCropParameters, [&](const char* name) { return parameters.has(name); })) return size;
   FilmCrop crop;
-  crop.x = readPixels(parameters, "crop_offset_x", 0, 0, camera.width - 1);
-  crop.y = readPixels(parameters, "crop_offset_y", 0, 0, camera.height - 1);
-  crop.width = readPixels(parameters, "crop_width", camera.width - crop.x, 1, camera.width - crop.x);
-  crop.height = readPixels(parameters, "crop_height", camera.height - crop.y, 1, camera.height - crop.y);
-  camera.crop = crop;
+  crop.x = readPixels(parameters, "crop_offset_x", 0, 0, size.width - 1);
+  crop.y = readPixels(parameters, "crop_offset_y", 0, 0, size.height - 1);
+  crop.width = readPixels(parameters, "crop_width", size.width - crop.x, 1, size.width - crop.x);
+  crop.height = readPixels(parameters, "crop_height", size.height - crop.y, 1, size.height - crop.y);
+  size.crop = crop;
+  return size;
 }
 
 void readFilm(ReadContext& context, pugi::xml_node node) {
@@ -83,12 +93,11 @@ void readFilm(ReadContext& context, pugi::xml_node node) {
     return true;
   };
   const Parameters parameters = readParameters(context, node, "rfilter", onChild);
-  try {
-    readSize(parameters, context.scene.camera);
-  } catch (const ParameterError& error) {
-    failAt(context, node, parameters, error);
-  }
-  noteUnused(context, node, parameters);
+  Camera& camera = context.scene.camera;
+  const FilmSize size = makeFrom(context, node, parameters, [&](const Parameters& p) { return readSize(p, camera); });
+  camera.width = size.width;
+  camera.height = size.height;
+  camera.crop = size.crop;
 }
 
 void noteSampler(ReadContext& context, pugi::xml_node node) {
@@ -136,6 +145,17 @@ void readLens(const Parameters& parameters, Camera& camera) {
                          fmt::format("focus_distance must be positive, not {}", camera.focusDistance));
 }
 
+/// Distances along the viewing axis; planes that the file does not mention are not there.
+void readClipPlanes(const Parameters& parameters, Camera& camera) {
+  camera.nearClip = static_cast<float>(parameters.number("near_clip", 0));
+  camera.farClip = parameters.has("far_clip") ? static_cast<float>(parameters.number("far_clip", 0)) : camera.farClip;
+  if (!(camera.nearClip >= 0.0f))
+    throw ParameterError("near_clip", fmt::format("near_clip must not be negative, not {}", camera.nearClip));
+  if (!(camera.farClip > camera.nearClip))
+    throw ParameterError("far_clip",
+                         fmt::format("far_clip must be over near_clip, {}, not {}", camera.nearClip, camera.farClip));
+}
+
 void readPerspective(const Parameters& parameters, Camera& camera) {
   readFieldOfView(parameters, camera);
   camera.horizontalFov = horizontalFov(camera, camera.width, camera.height);
@@ -146,34 +166,65 @@ void readPerspective(const Parameters& parameters, Camera& camera) {
 /// In the order of Camera::Kind.
 constexpr std::array<std::string_view, 3> kCameras = {"perspective", "thinlens", "orthographic"};
 
-bool readCamera(ReadContext& context, pugi::xml_node node, const Parameters& parameters, Camera::Kind kind) {
-  Camera& camera = context.scene.camera;
+/// The camera on the film that has been read.
+Camera readCamera(ReadContext& context, pugi::xml_node node, const Parameters& parameters, Camera::Kind kind) {
+  Camera camera = context.scene.camera;
   camera.kind = kind;
   camera.toWorld = toWorld(parameters);
   if (kind != Camera::Kind::orthographic) readPerspective(parameters, camera);
   if (kind == Camera::Kind::thinlens) readLens(parameters, camera);
-  // Rays start at the pinhole, lens or film and never end, and but for a lens everything is in focus.
-  const bool lens = kind == Camera::Kind::thinlens;
-  for (const std::string name : {"near_clip", "far_clip", "focus_distance"})
-    if (parameters.has(name) && !(lens && name == (parameters.has("focus_distance") ? "focus_distance" : "far_clip"))) {
-      parameters.number(name, 0);
-      context.note(fmt::format("{}: no effect of {}", describe(node), name));
-    }
-  return true;
+  readClipPlanes(parameters, camera);
+  // Only a lens has a plane in focus.
+  if (kind != Camera::Kind::thinlens && parameters.has("focus_distance")) {
+    parameters.number("focus_distance", 0);
+    context.findings.noteWithoutEffect(describe(node), "focus_distance");
+  }
+  return camera;
 }
 
-std::optional<int> readMaxDepth(ReadContext& context, pugi::xml_node node) {
-  for (const pugi::xml_node child : node.children()) {
-    if (elementName(child) == "integrator")
-      if (const std::optional<int> depth = readMaxDepth(context, child)) return depth;
-    if (normalisedName(child.attribute("name").value()) != "max_depth") continue;
-    const char* text = child.attribute("value").value();
-    const std::optional<int> depth = parseInteger(text);
-    if (!depth || *depth < -1)
-      context.file.fail(child, fmt::format("max_depth must be an integer, or -1 for no limit, not \"{}\"", text));
-    if (*depth >= 0) return depth;
-  }
-  return std::nullopt;
+/// Integrators that show something else than the light that arrives.
+constexpr std::array<std::string_view, 6> kNotOfLight = {"albedo", "ao", "depth", "field", "motion", "normal"};
+
+/// How much light an integrator leaves out.
+struct LightTransport {
+  std::optional<int> maxDepth;
+  bool hideEmitters = false;
+};
+
+std::optional<int> readMaxDepth(const Parameters& parameters) {
+  if (!parameters.has("max_depth")) return std::nullopt;
+  const double depth = parameters.number("max_depth", -1);
+  if (!(depth >= -1 && depth <= 1e9) || depth != std::floor(depth))
+    throw ParameterError("max_depth",
+                         fmt::format("max_depth must be an integer from 0, or -1 for no limit, not {}", depth));
+  return depth < 0 ? std::nullopt : std::optional(static_cast<int>(depth));
+}
+
+LightTransport readTransport(const std::string& type, const Parameters& parameters) {
+  LightTransport transport;
+  transport.maxDepth = readMaxDepth(parameters);
+  constexpr int kDirect = 2;  // segments
+  if (type == "direct") transport.maxDepth = std::min(transport.maxDepth.value_or(kDirect), kDirect);
+  transport.hideEmitters = parameters.flag("hide_emitters", false);
+  return transport;
+}
+
+/// Of the integrator or, for one that wraps another, of the inner one.
+LightTransport readTransportOf(ReadContext& context, pugi::xml_node node) {
+  const std::string type = node.attribute("type").value();
+  std::optional<LightTransport> nested;
+  const auto onChild = [&](pugi::xml_node child, const std::string&, Parameters&) {
+    if (elementName(child) == "integrator") nested = readTransportOf(context, child);
+    return true;  // whatever else belongs to how it integrates
+  };
+  if (std::ranges::find(kNotOfLight, type) != kNotOfLight.end())
+    context.unsupported(node, "integrator " + type,
+                        fmt::format("integrator \"{}\" shows something else than light", type),
+                        "the light is rendered");
+  const Parameters parameters = readParameters(context, node, "integrator", onChild);
+  const LightTransport own =
+      makeFrom(context, node, parameters, [&](const Parameters& p) { return readTransport(type, p); });
+  return nested.value_or(own);
 }
 
 }  // namespace
@@ -196,17 +247,24 @@ void readSensor(ReadContext& context, pugi::xml_node node) {
     else if (tag == "sampler")
       noteSampler(context, child);
     else if (tag == "medium")
-      noteMedium(context);
+      rejectMedium(context, child);
     return tag == "film" || tag == "sampler" || tag == "medium";
   };
   const Parameters parameters = readParameters(context, node, "film, sampler", onChild);
-  makeFrom(context, node, parameters, [&](const Parameters& p) { return readCamera(context, node, p, kind); });
+  context.scene.camera =
+      makeFrom(context, node, parameters, [&](const Parameters& p) { return readCamera(context, node, p, kind); });
 }
 
 void readIntegrator(ReadContext& context, pugi::xml_node node) {
-  context.scene.maxDepth = readMaxDepth(context, node);
-  context.note(fmt::format("integrator \"{}\" is replaced by ours{}", node.attribute("type").value(),
-                           context.scene.maxDepth ? ", max_depth is kept" : ""));
+  const LightTransport transport = readTransportOf(context, node);
+  Scene& scene = context.scene;
+  scene.maxDepth = transport.maxDepth;
+  if (transport.hideEmitters)
+    scene.emitterVisibility = context.file.isOfToday() ? EmitterVisibility::hidden : EmitterVisibility::dark;
+  std::string kept;
+  if (transport.maxDepth) kept += fmt::format("; paths have at most {} segments, as there", *transport.maxDepth);
+  if (transport.hideEmitters) kept += "; emitters are hidden, as there";
+  context.note(fmt::format("integrator \"{}\" is replaced by ours{}", node.attribute("type").value(), kept));
 }
 
 }  // namespace lobe

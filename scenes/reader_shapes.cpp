@@ -6,8 +6,8 @@
 #include <exception>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
+#include "runtime/core/parallel.h"
 #include "scenes/emission.h"
 #include "scenes/primitives.h"
 #include "scenes/reader_parameters.h"
@@ -93,7 +93,7 @@ void ShapeReader::addTo(int group, pugi::xml_node node) {
     context_.unsupported(
         node, "shape " + type,
         fmt::format("unknown shape type \"{}\"; {}", type, knownAre(type, fmt::format("{}", fmt::join(kTypes, ", ")))),
-        "it is left out");
+        "the shape is left out");
     return;
   }
   if (group != kTop && (type == "instance" || type == "shapegroup"))
@@ -174,7 +174,7 @@ bool ShapeReader::take(pugi::xml_node child, const std::string& name, const std:
   } else if (tag == "emitter") {
     takeEmitter(child, parts);
   } else if (tag == "medium") {
-    noteMedium(context_);
+    rejectMedium(context_, child);
   } else {
     return false;
   }
@@ -195,7 +195,8 @@ void ShapeReader::takeEmitter(pugi::xml_node node, Parts& parts) {
   const std::string type = typeOf(context_, node);
   if (type != "area") {
     context_.unsupported(node, "shape's emitter " + type,
-                         fmt::format("unknown emitter type \"{}\" in a shape; known is area", type), "it is left out");
+                         fmt::format("unknown emitter type \"{}\" in a shape; known is area", type),
+                         "the emitter is left out");
     return;
   }
   if (parts.emitter) context_.file.fail(node, "a second emitter for the same shape");
@@ -209,13 +210,14 @@ void ShapeReader::takeEmitter(pugi::xml_node node, Parts& parts) {
 
 ShapeReader::Mesh ShapeReader::makeMesh(const std::string& type, const Parameters& parameters,
                                         const MeshOptions& options) {
-  const std::filesystem::path path = context_.file.resolve(requiredText(parameters, "filename"));
+  const std::filesystem::path path =
+      context_.file.resolve(requiredText(parameters, "filename"), parameters.location("filename"));
   const int index = type == "serialized" ? readIndex(parameters) : 0;
   // They concern normals that the file lacks and vertices it repeats: ours are smooth, and what is equal is merged.
   parameters.number("max_smooth_angle", 0);
   parameters.flag("collapse", false);
   for (const char* name : {"max_smooth_angle", "collapse"})
-    if (parameters.has(name)) context_.note(fmt::format("shape \"{}\": no effect of {}", type, name));
+    if (parameters.has(name)) context_.findings.noteWithoutEffect(fmt::format("shape \"{}\"", type), name);
   return {{}, parameters.location("filename"), {type, path, index, {}}, options, ""};
 }
 
@@ -234,7 +236,7 @@ void ShapeReader::addMesh(int group, Mesh mesh, const std::string& name, const P
 }
 
 void ShapeReader::readMeshes() {
-  tbb::parallel_for(std::size_t{0}, meshes_.size(), [this](std::size_t i) {
+  parallelFor(std::size_t{0}, meshes_.size(), [this](std::size_t i) {
     read(meshes_[i]);
     if (context_.options.onProgress) context_.options.onProgress(1.0 / static_cast<double>(meshes_.size()));
   });
@@ -256,8 +258,7 @@ void ShapeReader::read(Mesh& mesh) {
 void ShapeReader::reportFault(const Mesh& mesh) {
   if (mesh.fault.empty()) return;
   const std::string message = fmt::format("shape \"{}\": {}", mesh.source.type, mesh.fault);
-  if (std::filesystem::exists(mesh.source.path)) context_.file.fail(mesh.location, message);
-  context_.unsupported(mesh.location, "missing mesh " + mesh.source.path.string(), message, "the shape is left out");
+  context_.unsupported(mesh.location, message, message, "the shape is left out");
 }
 
 void ShapeReader::dropEmpty(const Mesh& mesh) {

@@ -112,17 +112,23 @@ TexturePtr makeScaled(const Parameters& parameters) {
 
 TexturePtr TextureReader::read(pugi::xml_node node, Encoded encoded) {
   const auto [entry, isNew] = done_.try_emplace({SceneFile::location(node), encoded});
-  if (isNew)
-    entry->second = make(node, encoded);
-  else if (!entry->second)
-    context_.file.fail(node, "a texture that refers to itself");
+  if (isNew) {
+    TexturePtr made;
+    if (!context_.attempt("grey is used", [&] { made = make(node, encoded); }))
+      made = constantTexture(grey(kPlainGrey));
+    entry->second = std::move(made);
+  } else if (!entry->second) {
+    context_.unsupported(node, fmt::format("circle at {}", SceneFile::location(node)),
+                         "a texture that refers to itself", "grey is used in it");
+    return constantTexture(grey(kPlainGrey));
+  }
   return entry->second;
 }
 
 bool TextureReader::take(pugi::xml_node child, const std::string& name, Parameters& parameters, Encoded encoded) {
   if (elementName(child) != "texture") return false;
   const std::string key = name.empty() ? "texture" : normalisedName(name);
-  if (parameters.contains(key)) context_.file.fail(child, fmt::format("the parameter \"{}\" is given twice", key));
+  if (parameters.contains(key)) warnOfRepetition(context_, child, key);
   parameters.set(key, read(child, encoded), SceneFile::location(child));
   return true;
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <variant>
@@ -136,6 +137,9 @@ struct Camera {
   Vec2 shift = Vec2::Zero();
   float apertureRadius = 0;  ///< of a thin lens, in units of the camera's frame, as is:
   float focusDistance = 1;   ///< of the plane in focus from the lens, along +z
+  /// What lies nearer or farther along +z, in units of the camera's frame, is not seen.
+  float nearClip = 0;
+  float farClip = std::numeric_limits<float>::infinity();
   /// The field of view as the file states it, to convert again when the size is overridden.
   float fov = 60;
   std::string fovAxis = "x";
@@ -152,6 +156,13 @@ struct PixelFilter {
   float b = 1.0f / 3.0f, c = 1.0f / 3.0f;  ///< Mitchell's and Netravali's parameters
 };
 
+/// How emitters look where the camera sees them directly, not by reflection or refraction.
+enum class EmitterVisibility {
+  shown,
+  dark,   ///< they do not emit towards the camera, and shapes that emit are seen as what they are made of
+  hidden  ///< nor are shapes that emit seen: the camera sees what is behind them
+};
+
 struct Scene {
   std::vector<Shape> shapes;
   std::vector<ShapeGroup> groups;
@@ -160,9 +171,10 @@ struct Scene {
   std::vector<DeltaLight> lights;  ///< besides the emitting shapes
   Camera camera;
   PixelFilter filter;
-  std::optional<int> maxDepth;        ///< as the file says, in segments; the command line overrides
+  std::optional<int> maxDepth;  ///< longest path in segments, 0 or more, as the file says
+  EmitterVisibility emitterVisibility = EmitterVisibility::shown;
   std::vector<std::string> notes;     ///< what was read but replaced by ours (integrators, samplers, film options)
-  std::vector<std::string> warnings;  ///< what --lenient passed over
+  std::vector<std::string> warnings;  ///< what was not taken as it stands, and what lenient reading passed over
 };
 
 }  // namespace lobe

@@ -2,54 +2,22 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cerrno>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
-#include <sstream>
+#include <optional>
 #include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "scenes/reader.h"
+#include "scenes/file_text.h"
 
 namespace lobe {
 namespace {
 
-/// Before the first character; it is none itself.
-constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
-
-std::string readText(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw SceneError(fmt::format("{}: cannot open: {}", path.string(), std::strerror(errno)));
-  std::ostringstream text;
-  text << file.rdbuf();
-  if (!file || std::filesystem::is_directory(path))
-    throw SceneError(fmt::format("{}: cannot read, or empty", path.string()));
-  return std::move(text).str();
-}
-
 bool isNameCharacter(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) || c == '_';
 }
-
-/// FILE:LINE:COLUMN of an offset.
-std::string placeIn(const std::filesystem::path& path, std::string_view text, std::size_t offset) {
-  const std::size_t end = std::min(offset, text.size());
-  int line = 1, column = 1;
-  for (std::size_t i = text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0; i < end; ++i) {
-    if (text[i] == '\n')
-      ++line, column = 1;
-    else if ((text[i] & 0xc0) != 0x80)  // bytes that continue a UTF-8 character do not count
-      ++column;
-  }
-  return fmt::format("{}:{}:{}", path.string(), line, column);
-}
-
-struct Range {
-  std::size_t begin, end;
-};
 
 /// From behind the '<' of an element's start tag to behind its '>'.
 std::size_t endOfTag(std::string_view text, std::size_t begin) {
@@ -66,7 +34,7 @@ std::size_t endOfTag(std::string_view text, std::size_t begin) {
 }
 
 /// What is between the tags of a well-formed file's <scene>.
-Range bodyOfScene(std::string_view text, std::size_t root) {
+TextRange bodyOfScene(std::string_view text, std::size_t root) {
   const std::size_t begin = endOfTag(text, root);
   if (text[begin - 2] == '/') return {begin, begin};
   return {begin, text.rfind("</scene")};
@@ -96,10 +64,47 @@ pugi::xml_node sceneIn(const pugi::xml_document& document, const pugi::xml_parse
   return scene;
 }
 
+bool equalButForCase(std::string_view a, std::string_view b) {
+  return std::ranges::equal(a, b, [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+}
+
+/// The only entry of the folder whose name differs by case at most.
+std::optional<std::filesystem::path> entryOfSimilarName(const std::filesystem::path& folder, const std::string& name) {
+  std::optional<std::filesystem::path> found;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    if (!equalButForCase(entry.path().filename().string(), name)) continue;
+    if (found) return std::nullopt;
+    found = folder / entry.path().filename();
+  }
+  return found;
+}
+
+/// What the name may mean on a system that tells neither cases nor '/' and '\\' apart, such as the one that many scenes
+/// are made on; nothing unless exactly one file fits.
+std::optional<std::filesystem::path> fileOfSimilarName(std::filesystem::path folder, std::string name) {
+  std::ranges::replace(name, '\\', '/');
+  for (const std::filesystem::path& part : std::filesystem::path(name)) {
+    if (part.empty() || part == "." || part == ".." || part == "/" || std::filesystem::exists(folder / part)) {
+      folder /= part;
+      continue;
+    }
+    const std::optional<std::filesystem::path> next = entryOfSimilarName(folder, part.string());
+    if (!next) return std::nullopt;
+    folder = *next;
+  }
+  return folder;
+}
+
 }  // namespace
 
-SceneFile::SceneFile(const std::filesystem::path& path, const std::map<std::string, std::string>& definitions)
-    : files_{{path, readText(path), 0}}, text_(files_[0].text), segments_{{0, 0, 0}}, values_(definitions) {
+SceneFile::SceneFile(const std::filesystem::path& path, const std::map<std::string, std::string>& definitions,
+                     Findings& findings)
+    : findings_(findings),
+      files_{{path, readXmlText(path), 0}},
+      text_(files_[0].text),
+      segments_{{0, 0, 0}},
+      values_(definitions) {
   do {
     parse();
     readDefaults();
@@ -112,7 +117,8 @@ SceneFile::SceneFile(const std::filesystem::path& path, const std::map<std::stri
 }
 
 void SceneFile::parse() {
-  const pugi::xml_parse_result result = document_.load_buffer(text_.data(), text_.size());
+  const pugi::xml_parse_result result =
+      document_.load_buffer(text_.data(), text_.size(), pugi::parse_default, pugi::encoding_utf8);
   ParseFault fault;
   scene_ = sceneIn(document_, result, fault);
   if (!scene_) fail(static_cast<std::ptrdiff_t>(fault.offset), fault.message);
@@ -135,10 +141,17 @@ void SceneFile::checkDepth() const {
   } while (node != scene_);
 }
 
+void SceneFile::fault(pugi::xml_node node, const std::string& message, const std::string& consequence) {
+  findings_.fault(where(node), message, message, consequence);
+}
+
 void SceneFile::readDefaults() {
   for (const pugi::xml_node node : scene_.children("default")) {
     const pugi::xml_attribute name = node.attribute("name"), value = node.attribute("value");
-    if (!name || !value) fail(node, "<default> needs a name and a value");
+    if (!name || !value) {
+      fault(node, "<default> needs a name and a value", "it is ignored");
+      continue;
+    }
     usedNames_.insert(name.value());
     if (!values_.contains(name.value())) values_.emplace(name.value(), substituted(value.value(), node));
   }
@@ -147,29 +160,39 @@ void SceneFile::readDefaults() {
 void SceneFile::readFolders() {
   folders_.clear();
   for (const pugi::xml_node node : scene_.children("path")) {
-    const pugi::xml_attribute value = node.attribute("value");
-    if (!value) fail(node, "<path> needs a value");
-    folders_.push_back(files_[0].path.parent_path() / substituted(value.value(), node));
-    if (!std::filesystem::is_directory(folders_.back()))
-      fail(node, fmt::format("<path>: there is no folder {}", folders_.back().string()));
+    const std::filesystem::path folder = resolve(substituted(node.attribute("value").value(), node), location(node));
+    if (!node.attribute("value"))
+      fault(node, "<path> needs a value", "it is ignored");
+    else if (!std::filesystem::is_directory(folder))
+      fault(node, fmt::format("<path>: there is no folder {}", folder.string()), "it is ignored");
+    else
+      folders_.push_back(folder);
   }
 }
 
-/// Puts the file of the first <include> in its place. Returns whether there was one.
+/// Puts the file of the first <include> in its place, or takes it out when that fails. Returns whether there was one.
 bool SceneFile::expandInclude() {
   const pugi::xml_node include = scene_.child("include");
   if (!include) return false;
   const auto begin = static_cast<std::size_t>(location(include));
   std::size_t end = endOfTag(text_, begin);
   if (text_[end - 2] != '/') end = endOfTag(text_, text_.find("</include", end));
-  splice(begin, end, addFile(include));
+  const std::size_t around = segmentAt(begin).file;
+  try {
+    const std::size_t file = addFile(include);
+    splice(begin, end, {file, bodyOf(file)});
+  } catch (const SceneError& error) {
+    for (const Fault& fault : error.faults())
+      findings_.fault(fault.where, fault.message, fault.message, "what is included there is left out");
+    splice(begin, end, {around, {0, 0}});
+  }
   return true;
 }
 
 std::size_t SceneFile::addFile(pugi::xml_node include) {
   const pugi::xml_attribute name = include.attribute("filename");
   if (!name) fail(include, "<include> needs a filename");
-  const std::filesystem::path path = resolve(substituted(name.value(), include));
+  const std::filesystem::path path = resolve(substituted(name.value(), include), location(include));
   if (!std::filesystem::is_regular_file(path)) fail(include, fmt::format("<include>: no file {}", path.string()));
   const std::size_t parent = segmentAt(static_cast<std::size_t>(location(include))).file;
   for (std::size_t file = parent;; file = files_[file].parent) {
@@ -177,29 +200,34 @@ std::size_t SceneFile::addFile(pugi::xml_node include) {
       fail(include, fmt::format("<include>: {} includes itself", path.string()));
     if (file == 0) break;
   }
-  files_.push_back({path, readText(path), parent});
+  files_.push_back({path, readXmlText(path), parent});
   return files_.size() - 1;
 }
 
-/// Replaces what is from begin to before end, all of one segment, by what is in the file's <scene>.
-void SceneFile::splice(std::size_t begin, std::size_t end, std::size_t file) {
+/// Where in the file's text the content of its <scene> is.
+TextRange SceneFile::bodyOf(std::size_t file) const {
   const std::string& text = files_[file].text;
   pugi::xml_document document;
   ParseFault fault;
-  const pugi::xml_node scene = sceneIn(document, document.load_buffer(text.data(), text.size()), fault);
-  if (!scene) throw SceneError(fmt::format("{}: {}", placeIn(files_[file].path, text, fault.offset), fault.message));
-  const Range body = bodyOfScene(text, static_cast<std::size_t>(location(scene)));
-  const std::size_t length = body.end - body.begin;
+  const pugi::xml_node scene = sceneIn(
+      document, document.load_buffer(text.data(), text.size(), pugi::parse_default, pugi::encoding_utf8), fault);
+  if (!scene) throw SceneError(placeIn(files_[file].path, text, fault.offset), fault.message);
+  return bodyOfScene(text, static_cast<std::size_t>(location(scene)));
+}
+
+/// Replaces what is from begin to before end, all of one segment, by a part of a file.
+void SceneFile::splice(std::size_t begin, std::size_t end, const Part& part) {
+  const std::size_t length = part.range.end - part.range.begin;
   const Segment around = segmentAt(begin);
   std::vector<Segment> segments;
   for (const Segment& segment : segments_)
     if (segment.begin < begin) segments.push_back(segment);
-  segments.push_back({begin, file, body.begin});
+  if (length > 0) segments.push_back({begin, part.file, part.range.begin});
   segments.push_back({begin + length, around.file, around.offset + (end - around.begin)});
   for (const Segment& segment : segments_)
     if (segment.begin >= end) segments.push_back({segment.begin - end + begin + length, segment.file, segment.offset});
   segments_ = std::move(segments);
-  text_.replace(begin, end - begin, text, body.begin, length);
+  text_.replace(begin, end - begin, files_[part.file].text, part.range.begin, length);
 }
 
 const SceneFile::Segment& SceneFile::segmentAt(std::size_t offset) const {
@@ -228,10 +256,12 @@ std::string SceneFile::substituted(const std::string& text, pugi::xml_node node)
     const std::string name = text.substr(i + 1, end - i - 1);
     const auto it = values_.find(name);
     if (it == values_.end())
-      fail(node, fmt::format("${} is not defined: neither by a <default> nor by -D{}", name,
-                             values_.empty() ? "" : fmt::format("; defined are {}", fmt::join(names(), ", "))));
+      fault(node,
+            fmt::format("${} is not defined: neither by a <default> nor by -D{}", name,
+                        values_.empty() ? "" : fmt::format("; defined are {}", fmt::join(names(), ", "))),
+            "the element is left out");
+    result += it == values_.end() ? "$" + name : it->second;
     usedNames_.insert(name);
-    result += it->second;
     i = end;
   }
   return result;
@@ -242,6 +272,10 @@ void SceneFile::checkDefinitionsUsed(const std::map<std::string, std::string>& d
     if (!usedNames_.contains(name))
       fail(scene_, fmt::format("the scene does not use ${}, which -D defines; it uses {}", name,
                                usedNames_.empty() ? "none" : fmt::format("{}", fmt::join(usedNames_, ", "))));
+}
+
+bool SceneFile::hasUndefinedName(pugi::xml_node node) {
+  return std::ranges::any_of(node.attributes(), [](pugi::xml_attribute a) { return std::strchr(a.value(), '$'); });
 }
 
 std::vector<std::string> SceneFile::names() const {
@@ -258,7 +292,8 @@ void SceneFile::indexIds(pugi::xml_node node) {
     if (!id.empty() && name != "ref" && name != "alias") {
       const auto [it, isNew] = ids_.emplace(id, child);
       if (!isNew)
-        fail(child, fmt::format("the id \"{}\" is taken by the <{}> at {}", id, it->second.name(), where(it->second)));
+        fault(child, fmt::format("the id \"{}\" is taken by the <{}> at {}", id, it->second.name(), where(it->second)),
+              "the first one has it");
     }
     indexIds(child);
   }
@@ -267,16 +302,30 @@ void SceneFile::indexIds(pugi::xml_node node) {
 void SceneFile::indexAliases() {
   for (const pugi::xml_node node : scene_.children("alias")) {
     const std::string id = node.attribute("id").value(), as = node.attribute("as").value();
-    if (id.empty() || as.empty()) fail(node, "<alias> needs an id and an as");
-    if (!byId(id)) fail(node, fmt::format("nothing has the id \"{}\"", id));
-    if (!ids_.emplace(as, byId(id)).second) fail(node, fmt::format("the id \"{}\" is taken", as));
+    const std::string consequence = "the alias is ignored";
+    if (id.empty() || as.empty())
+      fault(node, "<alias> needs an id and an as", consequence);
+    else if (!byId(id))
+      fault(node, fmt::format("nothing has the id \"{}\"", id), consequence);
+    else if (!ids_.emplace(as, byId(id)).second)
+      fault(node, fmt::format("the id \"{}\" is taken", as), consequence);
   }
 }
 
-std::filesystem::path SceneFile::resolve(const std::string& name) const {
-  for (auto folder = folders_.rbegin(); folder != folders_.rend(); ++folder)
-    if (std::filesystem::exists(*folder / name)) return *folder / name;
-  return files_[0].path.parent_path() / name;
+std::filesystem::path SceneFile::resolve(const std::string& name, std::ptrdiff_t location) const {
+  std::vector<std::filesystem::path> folders(folders_.rbegin(), folders_.rend());
+  folders.push_back(files_[0].path.parent_path());
+  for (const std::filesystem::path& folder : folders)
+    if (std::filesystem::exists(folder / name)) return folder / name;
+  for (const std::filesystem::path& folder : folders) {
+    const std::optional<std::filesystem::path> similar = fileOfSimilarName(folder, name);
+    if (!similar) continue;
+    const std::string message =
+        fmt::format("there is no {}; {} is taken for it", (folder / name).string(), similar->string());
+    findings_.warn(where(location), message, message);
+    return *similar;
+  }
+  return folders.back() / name;
 }
 
 bool SceneFile::isOfToday() const {
@@ -302,7 +351,7 @@ std::string SceneFile::where(std::ptrdiff_t location) const {
 }
 
 void SceneFile::fail(std::ptrdiff_t location, std::string_view message) const {
-  throw SceneError(fmt::format("{}: {}", where(location), message));
+  throw SceneError(where(location), std::string(message));
 }
 
 }  // namespace lobe

@@ -1,8 +1,7 @@
 #include "scenes/scene_hash.h"
 
-#include <tbb/parallel_for.h>
-
 #include "materials/fingerprint.h"
+#include "runtime/core/parallel.h"
 
 namespace lobe {
 namespace {
@@ -71,7 +70,7 @@ std::uint64_t hashOf(const Shape& shape, const std::vector<Material>& materials)
 /// Meshes are large: each by itself, in parallel.
 void addShapes(Fingerprint& hash, const std::vector<Shape>& shapes, const std::vector<Material>& materials) {
   std::vector<std::uint64_t> hashes(shapes.size());
-  tbb::parallel_for(std::size_t{0}, shapes.size(), [&](std::size_t i) { hashes[i] = hashOf(shapes[i], materials); });
+  parallelFor(std::size_t{0}, shapes.size(), [&](std::size_t i) { hashes[i] = hashOf(shapes[i], materials); });
   hash.array(std::span<const std::uint64_t>(hashes));
 }
 
@@ -107,9 +106,11 @@ std::uint64_t pictureHash(const Scene& scene) {
     hash.number(pixels);
   for (const float value :
        {camera.horizontalFov, camera.shift.x(), camera.shift.y(), camera.apertureRadius, camera.focusDistance,
-        scene.filter.radius, scene.filter.stddev, scene.filter.b, scene.filter.c})
+        camera.nearClip, camera.farClip, scene.filter.radius, scene.filter.stddev, scene.filter.b, scene.filter.c})
     hash.number(value);
   hash.number(scene.filter.kind);
+  hash.number(scene.maxDepth.value_or(-1));
+  hash.number(scene.emitterVisibility);
   return hash.value();
 }
 

@@ -5,18 +5,30 @@
 #include <algorithm>
 #include <cmath>
 #include <new>
+#include <string_view>
 
 #include <fmt/format.h>
 
 namespace lobe {
 namespace {
 
-int fail(const std::string& name, const std::string& message, int code) {
-  std::string line = message;
-  std::ranges::replace(line, '\n', ' ');
-  fmt::print(stderr, "{}: error: {}\n", name, line);
+int fail(const std::string& name, std::string_view message, int code) {
+  while (!message.empty()) {
+    const std::size_t end = std::min(message.find('\n'), message.size());
+    fmt::print(stderr, "{}: error: {}\n", name, message.substr(0, end));
+    message.remove_prefix(std::min(end + 1, message.size()));
+  }
   return code;
 }
+
+/// For messages of libraries, which may be of several lines.
+std::string asOneLine(std::string message) {
+  std::ranges::replace(message, '\n', ' ');
+  return message;
+}
+
+/// Of the work: the time left is not told before so much is done, because the first steps may be unlike the others.
+constexpr double kLeastShareToExtrapolate = 0.02;
 
 /// Code points, which is what most letters of ours take on a terminal.
 std::size_t displayWidth(const std::string& text) {
@@ -46,7 +58,7 @@ int runTool(const std::string& name, const std::string& description, int argc, c
   } catch (const CLI::Success& e) {
     return app.exit(e);
   } catch (const CLI::ParseError& e) {
-    return fail(name, fmt::format("{} (see {} --help)", e.what(), name), 2);
+    return fail(name, asOneLine(fmt::format("{} (see {} --help)", e.what(), name)), 2);
   } catch (const UsageError& e) {
     return fail(name, e.what(), 2);
   } catch (const std::bad_alloc&) {
@@ -108,7 +120,7 @@ void Progress::print(Clock::time_point now) {
   std::string line = fmt::format("{}: {:3.0f} %", label_, std::floor(100 * share));
   if (share >= 1)
     line += ", " + formatSeconds(elapsed);
-  else if (share > 0)
+  else if (share >= kLeastShareToExtrapolate)
     line += ", " + formatSeconds(elapsed * (1 - share) / share) + " left";
   if (!terminal_) {
     fmt::print(stderr, "{}\n", line);

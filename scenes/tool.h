@@ -23,7 +23,7 @@ class UsageError : public std::runtime_error {
 
 /// Runs a tool: declare adds options to the CLI::App, which parses argv, then work runs. Returns the exit code: 0 done
 /// (also after --help and --version); 1 when work throws; 2 when parsing fails or anything throws UsageError. Errors
-/// are one line on stderr: "NAME: error: MESSAGE".
+/// go to stderr, "NAME: error: " before each line of their message.
 int runTool(const std::string& name, const std::string& description, int argc, char** argv,
             const std::function<void(CLI::App&)>& declare, const std::function<void()>& work);
 

@@ -19,11 +19,23 @@ namespace {
   throw std::runtime_error(fmt::format("{}: cannot write: {}", path.string(), std::strerror(error)));
 }
 
-/// The file that writing to path means: links are followed, and only regular files are replaced, so that -o /dev/null
-/// does not replace the device.
+/// Where a chain of symbolic links ends, whether or not there is a file.
+fs::path followLinks(fs::path path) {
+  constexpr int kMostLinks = 40;  // as many as Linux follows
+  std::error_code error;
+  for (int i = 0; i < kMostLinks; ++i) {
+    const fs::path next = fs::read_symlink(path, error);
+    if (error) return path;
+    path = path.parent_path() / next;  // an absolute target replaces the folder
+  }
+  refuse(path, ELOOP);
+}
+
+/// The file that writing to path means: links are followed, also to where there is no file yet, and only regular files
+/// are replaced, so that -o /dev/null does not replace the device.
 fs::path targetOf(const fs::path& path) {
   std::error_code error;
-  fs::path target = fs::is_symlink(path, error) ? fs::weakly_canonical(path, error) : path;
+  fs::path target = followLinks(path);
   const fs::file_status status = fs::status(target, error);
   if (fs::is_directory(status)) throw std::runtime_error(path.string() + ": cannot write: is a directory");
   if (fs::exists(status) && !fs::is_regular_file(status))

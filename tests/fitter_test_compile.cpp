@@ -4,11 +4,14 @@
 #include <cmath>
 #include <filesystem>
 
+#include <fmt/format.h>
 #include <tbb/global_control.h>
+#include <tbb/task.h>
 #include <nlohmann/json.hpp>
 
 #include "fitter/compile.h"
 #include "fitter/report.h"
+#include "runtime/core/parallel.h"
 #include "scenes/tool.h"
 #include "schema/atomic_file.h"
 #include "tests/fitter_test_lobes.h"
@@ -177,6 +180,53 @@ TEST_CASE("fitter: lobefit compiles a scene, then has nothing to do; lobedump sh
   CHECK(lineCount(r.out) == 6 + 5 + 1 + 2);  // header, records, gap, table
   r = runBinary(folder.path(), "lobedump --json lobes/*.lobe");
   CHECK(nlohmann::json::parse(r.out)[0]["records"].size() == 4);
+}
+
+TEST_CASE("fitter: a lobe that fails leaves the others whole, not half fitted") {
+  const Folder folder;
+  std::string scene = "<scene version=\"3.0.0\">";
+  for (int i = 0; i < 6; ++i)
+    scene += fmt::format(R"(<shape type="sphere"><bsdf type="roughconductor"><string name="distribution" value="ggx"/>
+                            <float name="alpha" value="{}"/></bsdf></shape>)",
+                         0.1 + 0.05 * i);
+  writeAtomically(folder / "scene.xml", scene + "</scene>");
+  const std::string fit = "lobefit scene.xml --method wem --elevations 48 --samples 1024 -o ";
+  REQUIRE(runBinary(folder.path(), fit + "clean").code == 0);
+  std::vector<fs::path> names;
+  for (const auto& entry : fs::directory_iterator(folder / "clean")) names.push_back(entry.path().filename());
+  REQUIRE(names.size() == 6);
+  // A folder where one cache should be: its lobe fails while the others are being fitted.
+  for (const fs::path& obstacle : names) {
+    fs::remove_all(folder / "b");
+    fs::create_directories(folder / "b" / obstacle);
+    const ToolRun r = runBinary(folder.path(), fit + "b");
+    CHECK(r.code == 1);
+    CHECK_THAT(r.error, Catch::Contains(obstacle.string()) && Catch::Contains("the other 5 lobes are written"));
+    fs::remove(folder / "b" / obstacle);
+    CHECK(runBinary(folder.path(), fit + "b").code == 0);
+    for (const fs::path& name : names) CHECK(readFile(folder / "b" / name) == readFile(folder / "clean" / name));
+  }
+}
+
+TEST_CASE("fitter: a fit that is cancelled from outside throws instead of returning a part") {
+  const BsdfPtr bsdf = roughConductor(0.3, 0.3);
+  CompileOptions options;
+  const CompileJob job = planCompile(collectLobes(sceneOf({{"a", bsdf}})), options).front();
+  for (const bool fixedGrid : {true, false}) {
+    FitSettings settings = job.info.settings;
+    settings.fixedGrid = fixedGrid;
+    bool returned = false;
+    const auto fitBesideFailure = [&] {
+      parallelFor(0, 1, [&](int) {
+        // The enclosing loop is cancelled at the first direction that is fitted.
+        tbb::task_group_context* enclosing = tbb::task::current_context();
+        fitGrid(*job.use.lobe, job.grid, settings, [enclosing] { enclosing->cancel_group_execution(); });
+        returned = true;
+      });
+    };
+    CHECK_THROWS_AS(fitBesideFailure(), LoopCancelled);
+    CHECK(!returned);
+  }
 }
 
 TEST_CASE("fitter: tools refuse bad input with one line") {

@@ -183,20 +183,21 @@ TEST_CASE("scenes: emitters, films, filters and samplers may stand at the top an
   CHECK(!scene.shapes[1].emitter);
 }
 
-TEST_CASE("scenes: parameters without effect here are noted") {
-  const auto notes = [](const std::string& body) { return readBody(body).notes; };
-  using Notes = std::vector<std::string>;
-  CHECK(notes("<bsdf type=\"normalmap\"><bsdf type=\"diffuse\"/><texture name=\"normalmap\" type=\"checkerboard\"/>"
-              "<boolean name=\"flip_invalid_normals\" value=\"True\"/></bsdf>") ==
-        Notes{"bsdf \"normalmap\": no effect of flip_invalid_normals"});
-  CHECK(notes("<emitter type=\"sunsky\"><float name=\"sun_aperture\" value=\"0.5\"/></emitter>") ==
-        Notes{"emitter \"sunsky\": no effect of sun_aperture"});
+TEST_CASE("scenes: parameters without effect on the picture are noted in one line") {
   const Scene scene = readBody(
-      "<emitter type=\"constant\"><float name=\"scale\" value=\"2.5\"/><transform name=\"toWorld\"/></emitter>");
+      "<emitter type=\"constant\"><float name=\"scale\" value=\"2.5\"/><transform name=\"toWorld\"/></emitter>"
+      "<sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/><float name=\"shutterOpen\" value=\"0\"/>"
+      "<float name=\"shutterClose\" value=\"1\"/><float name=\"focusDistance\" value=\"3\"/></sensor>");
   CHECK(scene.environment->radiance.at(0, 0).x() == 2.5f);
-  CHECK(scene.notes == Notes{"emitter \"constant\": no effect of to_world"});
+  REQUIRE(!scene.notes.empty());
+  CHECK(scene.notes.back() ==
+        "without effect on the picture: to_world of emitter \"constant\"; focus_distance, shutter_close, shutter_open "
+        "of sensor \"perspective\"");
   CHECK_THAT(faultOf("<emitter type=\"constant\"><float name=\"sun_aperture\" value=\"2\"/></emitter>"),
              Catch::Contains("unknown parameter"));
+  CHECK_THAT(faultOfText("<scene version=\"3.0.0\"><sensor type=\"perspective\"><film type=\"hdrfilm\">"
+                         "<integer name=\"widht\" value=\"2\"/></film></sensor></scene>"),
+             Catch::Contains("did you mean width?"));
 }
 
 TEST_CASE("scenes: roughness as people write it") {

@@ -244,6 +244,21 @@ TEST_CASE("schema: a link to an output is followed, not replaced") {
   CHECK(text == "new");
 }
 
+TEST_CASE("schema: a link whose target does not exist yet is written through") {
+  const TemporaryFolder folder;
+  fs::create_directory(folder.path / "renders");
+  fs::create_symlink("renders/picture", folder.path / "first");
+  fs::create_symlink("first", folder.path / "link");
+  checkWritable(folder.path / "link");
+  writeAtomically(folder.path / "link", std::string("new"));
+  CHECK(fs::is_symlink(folder.path / "link"));
+  std::string text;
+  std::ifstream(folder.path / "renders" / "picture") >> text;
+  CHECK(text == "new");
+  fs::create_symlink("loop", folder.path / "loop");
+  CHECK_THROWS_WITH(writeAtomically(folder.path / "loop", std::string("x")), Catch::Contains("loop: cannot write"));
+}
+
 TEST_CASE("schema: the file's name depends on the key alone") {
   CHECK(lobeFileName("ggx", "a") == lobeFileName("ggx", "a"));
   CHECK(lobeFileName("ggx", "a") != lobeFileName("ggx", "b"));

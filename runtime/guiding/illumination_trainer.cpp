@@ -7,7 +7,7 @@
 #include <string>
 #include <unordered_map>
 
-#include <tbb/parallel_for.h>
+#include "runtime/core/parallel.h"
 
 namespace lobe {
 namespace {
@@ -104,13 +104,13 @@ void IlluminationTrainer::fill(std::span<const std::span<const Particle>> source
 void IlluminationTrainer::learnShares(std::span<const ShareSample> samples) {
   std::vector<std::vector<ShareSample>> ofRecord(records_.size());
   for (const ShareSample& s : samples) ofRecord[cache_.indexOf(*s.record)].push_back(s);
-  tbb::parallel_for(std::size_t{0}, records_.size(), [&](std::size_t i) { records_[i].share.learn(ofRecord[i]); });
+  parallelFor(std::size_t{0}, records_.size(), [&](std::size_t i) { records_[i].share.learn(ofRecord[i]); });
 }
 
 std::optional<double> IlluminationTrainer::updateAll(const ParticleNeighbours& neighbours) {
   constexpr double none = std::numeric_limits<double>::quiet_NaN();
   std::vector<double> likelihoods(records_.size(), none);
-  tbb::parallel_for(std::size_t{0}, records_.size(), [&](std::size_t i) {
+  parallelFor(std::size_t{0}, records_.size(), [&](std::size_t i) {
     Training& record = records_[i];
     const Neighbourhood found = neighbours.around(record.position, record.normal, record.tangent);
     if (found.points.empty()) return;
@@ -142,7 +142,7 @@ void IlluminationTrainer::makeRecords(const ParticleNeighbours& neighbours, std:
     std::erase_if(waiting, isServed);
     const std::vector<RecordRequest> round = takeApart(waiting, kRoundSpacing * unit_);
     std::vector<std::optional<Training>> made(round.size());
-    tbb::parallel_for(std::size_t{0}, round.size(), [&](std::size_t i) { made[i] = makeRecord(neighbours, round[i]); });
+    parallelFor(std::size_t{0}, round.size(), [&](std::size_t i) { made[i] = makeRecord(neighbours, round[i]); });
     for (std::size_t i = 0; i < round.size(); ++i) {
       if (isServed(round[i])) continue;
       // Where there is no particle, asking again close by is in vain.

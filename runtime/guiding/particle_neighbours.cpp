@@ -5,9 +5,10 @@
 #include <iterator>
 #include <numbers>
 
-#include <tbb/parallel_for.h>
 #include <Eigen/Geometry>
 #include <nanoflann.hpp>
+
+#include "runtime/core/parallel.h"
 
 namespace lobe {
 namespace {
@@ -129,8 +130,8 @@ ParticleNeighbours::ParticleNeighbours(std::span<const std::span<const Particle>
   std::vector<std::span<const Particle>> filled;
   std::ranges::copy_if(sources, std::back_inserter(filled), [](const auto& source) { return !source.empty(); });
   trees_.resize(filled.size());
-  tbb::parallel_for(std::size_t{0}, filled.size(),
-                    [&](std::size_t i) { trees_[i] = std::make_unique<Tree>(filled[i], count, maxDistance); });
+  parallelFor(std::size_t{0}, filled.size(),
+              [&](std::size_t i) { trees_[i] = std::make_unique<Tree>(filled[i], count, maxDistance); });
 }
 
 ParticleNeighbours::~ParticleNeighbours() = default;

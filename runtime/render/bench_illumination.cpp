@@ -9,9 +9,9 @@
 
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
-#include <oneapi/tbb/parallel_for.h>
 #include <nlohmann/json.hpp>
 
+#include "runtime/core/parallel.h"
 #include "runtime/render/bench_training.h"
 #include "runtime/render/received_light.h"
 
@@ -75,7 +75,7 @@ Exam makeExam(const RenderScene& scene, const RayCamera& camera, const Options& 
   // Guided paths: light that was scattered before it came through panes is fireflies to others.
   const GuidedSampler sampler(scene.scene, best, nullptr);
   const GuidedIntegrator paths(scene, {}, sampler);
-  oneapi::tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+  parallelFor(std::size_t{0}, count, [&](std::size_t i) {
     const Receiver& receiver = exam.receivers[i];
     exam.particles[i] =
         particlesAround(receiver, particles, static_cast<std::size_t>(o.plan.records.neighbours), reach);

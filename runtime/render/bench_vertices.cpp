@@ -12,10 +12,10 @@
 
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
-#include <oneapi/tbb/parallel_for.h>
 #include <nlohmann/json.hpp>
 
 #include "materials/sampling.h"
+#include "runtime/core/parallel.h"
 #include "runtime/render/bench_training.h"
 #include "runtime/render/received_light.h"
 
@@ -270,7 +270,7 @@ std::vector<Grade> gradeAll(const Laboratory& lab, const std::deque<ReducedFacto
                             const std::vector<SurfaceHit>& vertices) {
   std::vector<Grade> grades(vertices.size());
   Progress progress("vertices", static_cast<double>(vertices.size()));
-  oneapi::tbb::parallel_for(std::size_t{0}, vertices.size(), [&](std::size_t i) {
+  parallelFor(std::size_t{0}, vertices.size(), [&](std::size_t i) {
     grades[i] = gradeVertex(lab, reductions, vertices[i], i);
     progress.advance();
   });

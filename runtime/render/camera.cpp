@@ -105,14 +105,22 @@ RayCamera::RayCamera(const Camera& camera, const PixelFilter& filter)
   lensX_ = toWorld.col(0) * radius;
   lensY_ = toWorld.col(1) * radius;
   focus_ = camera.focusDistance;
+  const float unit = toWorld.col(2).norm();
+  near_ = camera.nearClip * unit;
+  far_ = camera.farClip * unit;
+}
+
+Ray RayCamera::clipped(const Vec3& origin, const Vec3& direction) const {
+  const float cosine = direction.dot(axis_);
+  return {origin + direction * (near_ / cosine), direction, (far_ - near_) / cosine};
 }
 
 Ray RayCamera::rayThrough(const Vec2& point, const Vec2& lens) const {
   const Vec3 film = corner_ + point.x() * right_ + point.y() * down_;
-  if (kind_ == Camera::Kind::orthographic) return {position_ + film, axis_};
-  if (kind_ == Camera::Kind::perspective) return {position_, film.normalized()};
+  if (kind_ == Camera::Kind::orthographic) return clipped(position_ + film, axis_);
+  if (kind_ == Camera::Kind::perspective) return clipped(position_, film.normalized());
   const Vec3 offset = lens.x() * lensX_ + lens.y() * lensY_;
-  return {position_ + offset, (film - offset / focus_).normalized()};
+  return clipped(position_ + offset, (film - offset / focus_).normalized());
 }
 
 Ray RayCamera::sample(int x, int y, Rng& rng) const {

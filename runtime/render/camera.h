@@ -35,21 +35,24 @@ class RayCamera {
   int height() const { return height_; }
 
   /// The ray through an image point in pixels: (0, 0) is the top left corner of the picture. lens: where it leaves the
-  /// lens, a point of the unit disc.
+  /// lens, a point of the unit disc. It begins and ends at the camera's clip planes.
   Ray rayThrough(const Vec2& point, const Vec2& lens = Vec2::Zero()) const;
 
   /// A ray for the pixel in column x and row y, from anywhere on the lens.
   Ray sample(int x, int y, Rng& rng) const;
 
  private:
+  Ray clipped(const Vec3& origin, const Vec3& direction) const;
+
   Camera::Kind kind_;
   int width_, height_;
   Vec3 position_;
-  Vec3 axis_;          // orthographic: unit, the direction of all rays
+  Vec3 axis_;          // unit, the viewing direction
   Vec3 corner_;        // towards the top left corner (not unit), orthographic: to it
   Vec3 right_, down_;  // and what a pixel adds to it
   Vec3 lensX_, lensY_;
-  float focus_;  // corner_ times this is in focus
+  float focus_;       // corner_ times this is in focus
+  float near_, far_;  // clip planes: distances along axis_ in world units
   FilterSampler filter_;
 };
 

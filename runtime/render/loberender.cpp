@@ -8,6 +8,7 @@
 #include <oneapi/tbb/global_control.h>
 
 #include "runtime/render/render_job.h"
+#include "scenes/check_report.h"
 #include "scenes/tool.h"
 
 namespace {
@@ -33,6 +34,7 @@ struct Options {
   RenderJob job;
   std::string size, record, integrator = "product", shares = "learnt";
   int threads = 0;
+  bool check = false, json = false;
   std::vector<const CLI::Option*> training;  ///< options that only some integrators have a use for
 };
 
@@ -72,8 +74,7 @@ void declare(CLI::App& app, Options& options) {
   RenderJob& job = options.job;
   app.add_option("scene", job.scene, "Mitsuba scene file (XML)")->required();
   app.add_option("-o,--output", job.outputs, "Picture, .exr or .png; may be given several times")
-      ->allow_extra_args(false)  // else it would swallow the scene's name after it
-      ->required();
+      ->allow_extra_args(false);  // else it would swallow the scene's name after it
   app.add_option("--cache", job.cacheFolder, "Folder of the caches that lobefit made")->capture_default_str();
   app.add_option("--integrator", options.integrator, "path, guided or product")
       ->check(CLI::IsMember(kIntegratorNames))
@@ -84,7 +85,7 @@ void declare(CLI::App& app, Options& options) {
       ->capture_default_str();
   app.add_option("--seconds", job.seconds, "Seconds of training and rendering, instead of --spp");
   app.add_option("--size", options.size, "WIDTHxHEIGHT in pixels, instead of the scene's");
-  app.add_option("--max-depth", job.maxDepth, "Longest path in segments (default: no limit)");
+  app.add_option("--max-depth", job.maxDepth, "Longest path in segments (default: the scene's max_depth, or no limit)");
   app.add_option("--reduction", job.reduction,
                  "Merge Gaussians of lobes and records up to this cost (Runnalls; 0: none, the paper: 0.2)")
       ->capture_default_str();
@@ -106,7 +107,10 @@ void declare(CLI::App& app, Options& options) {
                  "PNG for it: mixture, particles of the last pass and incident light over the disc of directions")
       ->needs(record)
       ->capture_default_str();
-  app.add_flag("--lenient", job.lenient, "Pass over what the reader does not know, with warnings");
+  app.add_flag("--lenient", job.lenient, "Replace or leave out what is at fault in the scene, with warnings");
+  auto* check =
+      app.add_flag("--check", options.check, "Only read the scene and print all that is found; exit 1 on faults");
+  app.add_flag("--json", options.json, "Print what --check finds as JSON")->needs(check);
   declareTraining(app, options);
   addDefinitions(app, job.definitions);
   addThreads(app, options.threads);
@@ -125,6 +129,8 @@ void noteUnused(const Options& options) {
 }
 
 void work(Options& options) {
+  if (options.check)
+    return reportCheck(options.job.scene, {options.job.definitions, options.job.lenient}, options.json, stdout);
   const auto name = std::ranges::find(kIntegratorNames, options.integrator);
   options.job.integrator = static_cast<IntegratorKind>(name - kIntegratorNames.begin());
   options.job.training.learnShares = options.shares == "learnt";

@@ -1,6 +1,6 @@
 #include "runtime/render/particle_tracer.h"
 
-#include <oneapi/tbb/parallel_for.h>
+#include "runtime/core/parallel.h"
 
 namespace lobe {
 namespace {
@@ -12,7 +12,7 @@ template <class Result, class Trace>
 std::vector<Result> traceChunks(std::uint64_t seed, std::uint64_t stream, int count, const Trace& trace) {
   const int chunks = (count + kChunk - 1) / kChunk;
   std::vector<Result> results(chunks);
-  oneapi::tbb::parallel_for(0, chunks, [&](int chunk) {
+  parallelFor(0, chunks, [&](int chunk) {
     for (int i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
       Rng rng(seed, stream, i);
       trace(rng, results[chunk]);

@@ -41,6 +41,7 @@ struct PathOptions {
   int maxDepth = std::numeric_limits<int>::max();  ///< segments: 1 shows emitters only, 2 adds direct light
   int rouletteDepth = 5;                           ///< segments before paths may end by chance
   Termination termination = Termination::window;
+  EmitterVisibility emitterVisibility = EmitterVisibility::shown;
 };
 
 /// At most this often does a path go on once Russian roulette may end it, so that every path ends.
@@ -97,15 +98,28 @@ class PathLoop {
   // One segment and what happens at its end; false: the path is over.
   bool advance(Path& path) const {
     ++path.statistics.segments;
-    const std::optional<SurfaceHit> hit = scene_.tracer.trace(path.ray);
+    const bool dark = path.depth == 1 && options_.emitterVisibility != EmitterVisibility::shown;
+    const std::optional<SurfaceHit> hit = dark ? firstVisible(path) : scene_.tracer.trace(path.ray);
     if (!hit) {
+      if (dark) return false;
       const float light = path.pdf > 0.0f ? scene_.lights.environmentPdf(path.ray.direction) : 0.0f;
       addEmission(path, scene_.lights.environmentRadiance(path.ray.direction), light);
       return false;
     }
-    if (hit->emitter) addEmission(path, emittedRadiance(*hit), path.pdf > 0.0f ? lightPdf(path, *hit) : 0.0f);
+    if (hit->emitter && !dark) addEmission(path, emittedRadiance(*hit), path.pdf > 0.0f ? lightPdf(path, *hit) : 0.0f);
     if (!hit->bsdf || path.depth >= options_.maxDepth || !sidesAgree(*hit, hit->woWorld, hit->wo)) return false;
     return scatter(path, *hit);
+  }
+
+  // What the camera sees where emitters do not shine on it.
+  std::optional<SurfaceHit> firstVisible(Path& path) const {
+    for (;;) {
+      std::optional<SurfaceHit> hit = scene_.tracer.trace(path.ray);
+      if (!hit || !hit->emitter || options_.emitterVisibility == EmitterVisibility::dark) return hit;
+      path.ray.tfar -= hit->distance;
+      path.ray.origin = offsetPoint(*hit, path.ray.direction);
+      ++path.statistics.segments;
+    }
   }
 
   float lightPdf(const Path& path, const SurfaceHit& hit) const { return scene_.lights.pdf(path.previous, hit); }

@@ -274,7 +274,8 @@ void drawRecord(const RenderJob& job, const RenderScene& scene, const Receiver& 
 
 std::unique_ptr<Integrator> makeIntegrator(const RenderJob& job, const RenderScene& scene, const Guiding& guiding) {
   PathOptions options;
-  if (job.maxDepth) options.maxDepth = *job.maxDepth;
+  if (const std::optional<int> depth = job.maxDepth ? job.maxDepth : scene.scene.maxDepth) options.maxDepth = *depth;
+  options.emitterVisibility = scene.scene.emitterVisibility;
   options.termination = job.termination;
   if (!guiding.sampler) return std::make_unique<PathIntegrator>(scene, options);
   return std::make_unique<GuidedIntegrator>(scene, options, *guiding.sampler);
@@ -316,11 +317,12 @@ void RenderJob::validate() const {
           "--illumination and --save-illumination are for guided and product, path has none");
   require(illumination.empty() || saveIllumination.empty(),
           "--save-illumination keeps what is trained, but with --illumination nothing is");
-  require(!seconds || (*seconds > 0 && std::isfinite(*seconds)), "--seconds has to be over 0");
+  require(!seconds || (*seconds > 0 && std::isfinite(*seconds)), "--seconds has to be a finite number over 0");
   require(!size || (size->first >= 1 && size->second >= 1 && std::int64_t{size->first} * size->second <= kMaxPixels),
           fmt::format("--size has to be at least 1x1 and at most {} pixels", kMaxPixels));
   require(!maxDepth || *maxDepth >= 1, "--max-depth has to be at least 1");
-  require(!trainSeconds || (*trainSeconds > 0 && std::isfinite(*trainSeconds)), "--train-seconds has to be over 0");
+  require(!trainSeconds || (*trainSeconds > 0 && std::isfinite(*trainSeconds)),
+          "--train-seconds has to be a finite number over 0");
   require(!trainSeconds || !seconds || *trainSeconds < *seconds, "--train-seconds has to be less than --seconds");
   require(!passes || *passes >= 1, "--passes has to be at least 1");
   require(reference.empty() == convergence.empty(), "--reference and --convergence go together");

@@ -1,0 +1,18 @@
+#pragma once
+// Scene files as UTF-8, whatever they are stored in.
+
+#include <filesystem>
+#include <string>
+
+namespace lobe {
+
+/// The file's content in UTF-8, without a byte order mark. Its encoding is that of its byte order mark (UTF-8, UTF-16,
+/// UTF-32), or the one that its XML declaration names, or else UTF-8; what is UTF-8 already stays as it is. Throws
+/// SceneError at the file (or at the offending byte) when it cannot be read, is empty, names an encoding that is not
+/// known, or is not in the encoding that it names.
+std::string readXmlText(const std::filesystem::path& path);
+
+/// "FILE:LINE:COLUMN" of an offset in a file's text; columns count characters from one.
+std::string placeIn(const std::filesystem::path& path, std::string_view text, std::size_t offset);
+
+}  // namespace lobe
