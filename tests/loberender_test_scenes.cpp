@@ -1,5 +1,6 @@
 // What the notes about a scene file promise, looked for in rendered pictures.
 
+#include <fmt/format.h>
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
@@ -18,12 +19,13 @@ std::string sensor(const std::string& parameters) {
 }
 
 std::string rectangle(double z, const std::string& content) {
-  return R"(<shape type="rectangle"><transform name="to_world"><scale value="3"/><translate z=")" + std::to_string(z) +
-         R"("/></transform>)" + content + "</shape>";
+  return fmt::format(R"(<shape type="rectangle"><transform name="to_world"><scale value="3"/><translate z="{}"/>
+                        </transform>{}</shape>)",
+                     z, content);
 }
 
 std::string lamp(double radiance) {
-  return R"(<emitter type="area"><rgb name="radiance" value=")" + std::to_string(radiance) + R"("/></emitter>)";
+  return fmt::format(R"(<emitter type="area"><rgb name="radiance" value="{}"/></emitter>)", radiance);
 }
 
 const std::string kBlack = R"(<bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>)";
@@ -45,9 +47,9 @@ double meanOf(const std::string& version, const std::string& body, const std::st
 
 TEST_CASE("loberender: max_depth of the file rules the picture, unless the command line does") {
   const auto scene = [](int depth) {
-    return R"(<integrator type="path"><integer name="max_depth" value=")" + std::to_string(depth) +
-           R"("/></integrator>)" + sensor("") + rectangle(0, R"(<bsdf type="diffuse"/>)") +
-           R"(<emitter type="constant"/>)";
+    return fmt::format(R"(<integrator type="path"><integer name="max_depth" value="{}"/></integrator>{}{}
+                          <emitter type="constant"/>)",
+                       depth, sensor(""), rectangle(0, R"(<bsdf type="diffuse"/>)"));
   };
   CHECK(meanOf("3.0.0", scene(1)) == 0);  // the floor fills the picture
   CHECK(meanOf("3.0.0", scene(0)) == 0);

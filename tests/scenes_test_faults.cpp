@@ -67,8 +67,10 @@ TEST_CASE("scenes: unknown parameters are told with their owner") {
              {"\"power\""});
   checkFault(faultOf("<texture type=\"checkerboard\"><float name=\"size\" value=\"1\"/></texture>"), "2:30",
              {"\"size\""});
-  checkFault(faultOfText("<scene version=\"3.0.0\"><sensor type=\"perspective\"><float name=\"zoom\" value=\"1\"/></sensor></scene>"),
-             "1:51", {"\"zoom\""});
+  checkFault(
+      faultOfText(
+          "<scene version=\"3.0.0\"><sensor type=\"perspective\"><float name=\"zoom\" value=\"1\"/></sensor></scene>"),
+      "1:51", {"\"zoom\""});
   checkFault(faultOf("<shape type=\"disk\"><boolean name=\"flip_normals\" value=\"true\" vale=\"\"/></shape>"), "2:20",
              {"vale", "name, value"});
 }
