@@ -37,8 +37,8 @@ void passOnRemarks(ReadContext& context, pugi::xml_node node, const Parameters& 
 /// Parameters that a model refuses, one after the other.
 class RefusedParameters {
  public:
-  /// Erases the parameter that the error names. Throws SceneError when it names none that is there: the element itself is
-  /// refused, for the last parameter's sake if there was one.
+  /// Erases the parameter that the error names. Throws SceneError when it names none that is there: the element itself
+  /// is refused, for the last parameter's sake if there was one.
   void erase(ReadContext& context, pugi::xml_node node, Parameters& parameters, const ParameterError& error);
   /// A fault for each.
   void report(ReadContext& context) const;
