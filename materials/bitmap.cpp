@@ -58,6 +58,7 @@ class BitmapTexture final : public Texture {
   }
 
   Rgb mean() const override { return mean_; }
+  std::array<int, 2> resolution() const override { return {image_->width, image_->height}; }
   TextureRange range() const override {
     TextureRange range = rangeOf(*image_);
     const auto uses = [this](Wrap mode) { return options_.wrapU == mode || options_.wrapV == mode; };

@@ -16,7 +16,7 @@ class Blend final : public WeightedBsdf {
 
  private:
   PartWeights weights(const Vec2& uv) const override {
-    const float second = std::clamp(luminance(weight_->eval(uv)), 0.0f, 1.0f);
+    const float second = std::clamp(weight_->evalNumber(uv), 0.0f, 1.0f);
     return {1.0f - second, second};
   }
 

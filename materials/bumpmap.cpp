@@ -37,7 +37,7 @@ class BumpMap final : public NestedBsdf {
     const float step = (ahead - behind).sum();
     return step > 0.0f ? scale_ * (height(ahead) - height(behind)) / step : 0.0f;
   }
-  float height(const Vec2& uv) const { return luminance(displacement_->eval(uv)); }
+  float height(const Vec2& uv) const { return displacement_->evalNumber(uv); }
 
   TexturePtr displacement_;
   float scale_;

@@ -10,20 +10,25 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string_view>
 
 #include <fmt/format.h>
 
 #include "materials/fingerprint.h"
+#include "materials/rgbe_file.h"
 
 // Private to this file, so that another copy elsewhere does not clash.
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
 #define STBI_NO_GIF
+#define STBI_NO_HDR
+#define STBI_NO_LINEAR
 #define STBI_NO_PIC
 #define STBI_NO_PNM
 #define STBI_NO_PSD
@@ -47,6 +52,14 @@ void checkSize(const std::filesystem::path& path, std::int64_t width, std::int64
     fail(path, fmt::format("its size of {}x{} pixels is beyond what is read", width, height));
 }
 
+/// Nor must a file of some kilobytes, of which even a uniform picture takes more than this where it is large.
+void checkExpansion(const std::filesystem::path& path, std::int64_t width, std::int64_t height, std::size_t bytes) {
+  constexpr std::int64_t kLarge = std::int64_t{1} << 24, kMostPerByte = 2000;
+  checkSize(path, width, height);
+  if (width * height > kLarge && width * height / kMostPerByte > static_cast<std::int64_t>(bytes))
+    fail(path, fmt::format("its {}x{} pixels are too many to be meant by a file of {} bytes", width, height, bytes));
+}
+
 float decode(float encoded, const Encoding& encoding) {
   switch (encoding.kind) {
     case Encoding::Kind::linear:
@@ -54,6 +67,7 @@ float decode(float encoded, const Encoding& encoding) {
     case Encoding::Kind::gamma:
       return std::pow(encoded, encoding.exponent);
     case Encoding::Kind::srgb:
+    case Encoding::Kind::tagged:  // without a tag
       break;
   }
   return encoded <= 0.04045f ? encoded / 12.92f : std::pow((encoded + 0.055f) / 1.055f, 2.4f);
@@ -61,10 +75,19 @@ float decode(float encoded, const Encoding& encoding) {
 
 // ---- EXR
 
+/// What of a file becomes the image: its colours, or its alpha channel as grey.
+enum class Part { colours, alpha };
+
 using ChannelNames = std::array<const char*, 3>;
 
+[[noreturn]] void failWithoutAlpha(const std::filesystem::path& path) {
+  fail(path, "it has no alpha channel");
+}
+
 /// The names of the channels to read as red, green and blue.
-ChannelNames exrChannels(const std::filesystem::path& path, const Imf::ChannelList& channels) {
+ChannelNames exrChannels(const std::filesystem::path& path, const Imf::ChannelList& channels, Part part) {
+  if (part == Part::alpha && channels.findChannel("A")) return {"A", "A", "A"};
+  if (part == Part::alpha) failWithoutAlpha(path);
   if (channels.findChannel("R") && channels.findChannel("G") && channels.findChannel("B")) return {"R", "G", "B"};
   const bool chroma = channels.findChannel("RY") || channels.findChannel("BY");
   if (channels.findChannel("Y") && !chroma) return {"Y", "Y", "Y"};
@@ -95,8 +118,8 @@ Image placeOnDisplay(const Image& data, const Area& dataWindow, const Area& disp
 }
 
 /// The data window of the file, whichever of its channels are asked for.
-Image readDataWindow(const std::filesystem::path& path, Imf::InputFile& file, const Area& area) {
-  const ChannelNames names = exrChannels(path, file.header().channels());
+Image readDataWindow(const std::filesystem::path& path, Imf::InputFile& file, const Area& area, Part part) {
+  const ChannelNames names = exrChannels(path, file.header().channels(), part);
   const int distinct = names[0] == names[1] ? 1 : 3;
   Image image(static_cast<int>(area.width), static_cast<int>(area.height));
   // OpenEXR addresses pixels by their place in the data window, hence the shifted origin.
@@ -116,18 +139,18 @@ Image readDataWindow(const std::filesystem::path& path, Imf::InputFile& file, co
   return image;
 }
 
-Image readExrPixels(const std::filesystem::path& path) {
+Image readExrPixels(const std::filesystem::path& path, Part part) {
   Imf::InputFile file(path.c_str());
   const Area data(file.header().dataWindow()), display(file.header().displayWindow());
   checkSize(path, data.width, data.height);
   checkSize(path, display.width, display.height);
-  Image image = readDataWindow(path, file, data);
+  Image image = readDataWindow(path, file, data, part);
   return data == display ? image : placeOnDisplay(image, data, display);
 }
 
-Image readExr(const std::filesystem::path& path) {
+Image readExr(const std::filesystem::path& path, Part part) {
   try {
-    return readExrPixels(path);
+    return readExrPixels(path, part);
   } catch (const std::bad_alloc&) {
     fail(path, "too large for the memory there is");
   } catch (const Iex::BaseExc& e) {
@@ -144,11 +167,9 @@ template <class T>
 using Pixels = std::unique_ptr<T, FreePixels>;
 
 /// The file as stb_image takes it, to find out whether it asks for more than there is: JPEG and TGA files cut short
-/// would pass for whole ones, and an HDR file would be read for ever, zeros being all that follows its end. So some
-/// ones follow.
+/// would pass for whole ones.
 struct Source {
   std::string_view rest;
-  std::int64_t padding;
   bool exhausted = false;
 
   static int read(void* user, char* out, int size) {
@@ -156,12 +177,8 @@ struct Source {
     const std::size_t n = std::min(source.rest.size(), static_cast<std::size_t>(size));
     std::copy_n(source.rest.data(), n, out);
     source.rest.remove_prefix(n);
-    if (n > 0) return static_cast<int>(n);
-    source.exhausted = true;
-    const auto ones = static_cast<int>(std::min<std::int64_t>(source.padding, size));
-    source.padding -= ones;
-    std::fill_n(out, ones, '\1');
-    return ones;
+    if (n == 0) source.exhausted = true;
+    return static_cast<int>(n);
   }
   static void skip(void* user, int size) {
     Source& source = *static_cast<Source*>(user);
@@ -173,43 +190,44 @@ struct Source {
 };
 constexpr stbi_io_callbacks kSourceCallbacks = {Source::read, Source::skip, Source::eof};
 
+/// Red, green, blue and alpha of a pixel.
+constexpr int kComponents = 4;
+
 /// The pixels of an integer format by a table of what each code means.
 template <class T>
-Image decodeCodes(const T* codes, int width, int height, const Encoding& encoding) {
+Image decodeColours(const T* codes, int width, int height, const Encoding& encoding) {
   constexpr int kLargest = std::numeric_limits<T>::max();
   std::vector<float> linear(kLargest + 1);
   for (int i = 0; i <= kLargest; ++i) linear[i] = decode(static_cast<float>(i) / kLargest, encoding);
   Image image(width, height);
   for (Rgb& pixel : image.pixels) {
     pixel = Rgb(linear[codes[0]], linear[codes[1]], linear[codes[2]]);
-    codes += 3;
+    codes += kComponents;
   }
   return image;
 }
 
-struct Size {
-  int width = 0, height = 0;
-};
-
-/// Loads by one of stb_image's functions, three channels a pixel.
-template <class T, class Load>
-Pixels<T> loadPixels(const std::filesystem::path& path, std::string_view bytes, std::int64_t padding, Load load,
-                     Size& size) {
-  Source source{bytes, padding};
-  int channels = 0;
-  Pixels<T> pixels(load(&kSourceCallbacks, &source, &size.width, &size.height, &channels, 3));
-  if (source.exhausted) fail(path, "damaged image (it ends too early)");
-  if (!pixels) fail(path, fmt::format("damaged image ({})", stbi_failure_reason()));
-  return pixels;
+template <class T>
+Image decodeAlpha(const T* codes, int width, int height) {
+  Image image(width, height);
+  for (Rgb& pixel : image.pixels) {
+    pixel = grey(static_cast<float>(codes[3]) / std::numeric_limits<T>::max());
+    codes += kComponents;
+  }
+  return image;
 }
 
-Image readHdr(const std::filesystem::path& path, std::string_view bytes, Size size) {
-  // A run-length coded pixel takes at most eight bytes, and the line it is in four more.
-  const std::int64_t padding = std::int64_t{16} * size.width * size.height;
-  const Pixels<float> pixels = loadPixels<float>(path, bytes, padding, stbi_loadf_from_callbacks, size);
-  Image image(size.width, size.height);
-  std::copy_n(pixels.get(), image.pixels.size() * 3, image.pixels.data()->data());
-  return image;
+/// Loads by one of stb_image's functions.
+template <class T, class Load>
+Image loadPixels(const std::filesystem::path& path, std::string_view bytes, const Encoding& encoding, Part part,
+                 Load load) {
+  Source source{bytes};
+  int width = 0, height = 0, channels = 0;
+  const Pixels<T> pixels(load(&kSourceCallbacks, &source, &width, &height, &channels, kComponents));
+  if (source.exhausted) fail(path, "damaged image (it ends too early)");
+  if (!pixels) fail(path, fmt::format("damaged image ({})", stbi_failure_reason()));
+  return part == Part::alpha ? decodeAlpha<T>(pixels.get(), width, height)
+                             : decodeColours<T>(pixels.get(), width, height, encoding);
 }
 
 std::string readBytes(const std::filesystem::path& path) {
@@ -220,29 +238,82 @@ std::string readBytes(const std::filesystem::path& path) {
   return bytes;
 }
 
-Image readOther(const std::filesystem::path& path, const Encoding& encoding) {
+/// What read() returns; what it throws comes out with the file's name.
+template <class Read>
+auto naming(const std::filesystem::path& path, Read read) {
+  try {
+    return read();
+  } catch (const std::bad_alloc&) {
+    fail(path, "too large for the memory there is");
+  } catch (const std::runtime_error& error) {
+    fail(path, error.what());
+  }
+}
+
+Image readHdr(const std::filesystem::path& path, std::string_view bytes, Part part) {
+  if (part == Part::alpha) failWithoutAlpha(path);
+  const auto [width, height] = naming(path, [&] { return sizeOfRgbe(bytes); });
+  checkExpansion(path, width, height, bytes.size());
+  return naming(path, [&] { return readRgbe(bytes); });
+}
+
+std::uint32_t bigEndian(std::string_view bytes) {
+  std::uint32_t value = 0;
+  for (const char byte : bytes.substr(0, 4)) value = value << 8 | static_cast<std::uint8_t>(byte);
+  return value;
+}
+
+/// The exponent that a PNG's gAMA chunk asks for; nullopt where there is none, or an sRGB chunk, which goes before.
+std::optional<float> gammaOfPng(std::string_view bytes) {
+  constexpr std::string_view kSignature = "\x89PNG\r\n\x1a\n";
+  constexpr std::size_t kAround = 12;  // of a chunk's data: length, name and checksum
+  std::optional<float> gamma;
+  bytes.remove_prefix(bytes.starts_with(kSignature) ? kSignature.size() : bytes.size());
+  while (bytes.size() >= kAround) {
+    const std::size_t length = bigEndian(bytes);
+    const std::string_view name = bytes.substr(4, 4);
+    if (name == "IDAT" || length > bytes.size() - kAround) break;
+    if (name == "sRGB") return std::nullopt;
+    if (name == "gAMA" && length == 4)
+      if (const std::uint32_t value = bigEndian(bytes.substr(8)); value > 0) gamma = 1e5f / static_cast<float>(value);
+    bytes.remove_prefix(kAround + length);
+  }
+  return gamma;
+}
+
+/// What the file says of itself, where that is what is wanted.
+Encoding resolved(const Encoding& encoding, std::string_view bytes) {
+  if (encoding.kind != Encoding::Kind::tagged) return encoding;
+  const std::optional<float> gamma = gammaOfPng(bytes);
+  return gamma ? Encoding{Encoding::Kind::gamma, *gamma} : encoding;
+}
+
+Image readOther(const std::filesystem::path& path, const Encoding& encoding, Part part) {
   const std::string bytes = readBytes(path);
+  if (startsLikeRgbe(bytes)) return readHdr(path, bytes, part);
   const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
   const int length = static_cast<int>(bytes.size());
-  Size size;
-  int channels = 0;
-  if (!stbi_info_from_memory(data, length, &size.width, &size.height, &channels))
+  int width = 0, height = 0, channels = 0;
+  if (!stbi_info_from_memory(data, length, &width, &height, &channels))
     fail(path, fmt::format("not an image that can be read ({}); known are PNG, JPEG, BMP, TGA, HDR and EXR",
                            stbi_failure_reason()));
-  checkSize(path, size.width, size.height);
-  if (stbi_is_hdr_from_memory(data, length)) return readHdr(path, bytes, size);
-  if (stbi_is_16_bit_from_memory(data, length)) {
-    const Pixels<stbi_us> pixels = loadPixels<stbi_us>(path, bytes, 0, stbi_load_16_from_callbacks, size);
-    return decodeCodes(pixels.get(), size.width, size.height, encoding);
-  }
-  const Pixels<stbi_uc> pixels = loadPixels<stbi_uc>(path, bytes, 0, stbi_load_from_callbacks, size);
-  return decodeCodes(pixels.get(), size.width, size.height, encoding);
+  checkExpansion(path, width, height, bytes.size());
+  if (part == Part::alpha && channels != 2 && channels != 4) failWithoutAlpha(path);
+  if (stbi_is_16_bit_from_memory(data, length))
+    return loadPixels<stbi_us>(path, bytes, resolved(encoding, bytes), part, stbi_load_16_from_callbacks);
+  return loadPixels<stbi_uc>(path, bytes, resolved(encoding, bytes), part, stbi_load_from_callbacks);
 }
 
 bool startsLikeExr(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   char magic[4] = {};
   return file.read(magic, 4) && Imf::isImfMagic(magic);
+}
+
+Image readPart(const std::filesystem::path& path, const Encoding& encoding, Part part) {
+  if (!std::filesystem::exists(path)) fail(path, "no such file");
+  if (!std::filesystem::is_regular_file(path)) fail(path, "not a file");
+  return startsLikeExr(path) ? readExr(path, part) : readOther(path, encoding, part);
 }
 
 }  // namespace
@@ -253,9 +324,11 @@ void addTo(Fingerprint& hash, const Image& image) {
 }
 
 Image readImage(const std::filesystem::path& path, Encoding encoding) {
-  if (!std::filesystem::exists(path)) fail(path, "no such file");
-  if (!std::filesystem::is_regular_file(path)) fail(path, "not a file");
-  return startsLikeExr(path) ? readExr(path) : readOther(path, encoding);
+  return readPart(path, encoding, Part::colours);
+}
+
+Image readAlpha(const std::filesystem::path& path) {
+  return readPart(path, {}, Part::alpha);
 }
 
 }  // namespace lobe

@@ -26,15 +26,20 @@ class Fingerprint;
 /// Adds size and pixels.
 void addTo(Fingerprint& hash, const Image& image);
 
-/// How the numbers of an 8- or 16-bit file become linear: by the sRGB curve, as they are, or by a power (gamma).
+/// How the numbers of an 8- or 16-bit file become linear: by the sRGB curve, as they are, by a power (gamma), or as the
+/// file itself says (tagged: the gAMA chunk of a PNG that has no sRGB chunk; sRGB where there is nothing of the kind).
 struct Encoding {
-  enum class Kind { srgb, linear, gamma } kind = Kind::srgb;
+  enum class Kind { srgb, linear, gamma, tagged } kind = Kind::srgb;
   float exponent = 1.0f;
 };
 
-/// Reads PNG, JPEG, BMP, TGA, HDR (stb_image) and EXR (OpenEXR; R, G, B or a single luminance channel Y; the picture is
-/// the display window, black where the file has no pixels). Files with floating-point data are linear whatever the
-/// encoding says. Throws std::runtime_error that names the file and the fault.
+/// Reads PNG, JPEG, BMP, TGA (stb_image), HDR (rgbe_file.h) and EXR (OpenEXR; R, G, B or a single luminance channel Y;
+/// the picture is the display window, black where the file has no pixels). Files with floating-point data are linear
+/// whatever the encoding says. Alpha is dropped. Throws std::runtime_error that names the file and the fault.
 Image readImage(const std::filesystem::path& path, Encoding encoding = {});
+
+/// The alpha channel of such a file as grey: linear, from 0 to 1 where the file holds integers. Throws
+/// std::runtime_error, also where there is no such channel.
+Image readAlpha(const std::filesystem::path& path);
 
 }  // namespace lobe

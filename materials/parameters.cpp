@@ -70,6 +70,10 @@ bool Parameters::holdsTexture(std::string_view name) const {
   return it != entries_.end() && std::holds_alternative<TexturePtr>(it->second.value);
 }
 
+bool Parameters::varies(std::string_view name) const {
+  return holdsTexture(name) && !std::get<TexturePtr>(entries_.find(name)->second.value)->constantColour();
+}
+
 bool Parameters::flag(std::string_view name, bool fallback) const {
   const Entry* entry = find(name);
   if (!entry) return fallback;
@@ -96,12 +100,15 @@ Rgb Parameters::colour(std::string_view name, const Rgb& fallback) const {
   if (!entry) return fallback;
   if (const Rgb* value = std::get_if<Rgb>(&entry->value)) return *value;
   if (const double* value = std::get_if<double>(&entry->value)) return grey(static_cast<float>(*value));
+  if (const TexturePtr* value = std::get_if<TexturePtr>(&entry->value))
+    if (const std::optional<Rgb> constant = (*value)->constantColour()) return *constant;
   wrongKind(name, entry->value, "colour");
 }
 
 TexturePtr Parameters::texture(std::string_view name, const Rgb& fallback) const {
   if (const Entry* entry = find(name))
-    if (const TexturePtr* value = std::get_if<TexturePtr>(&entry->value)) return *value;
+    if (const TexturePtr* value = std::get_if<TexturePtr>(&entry->value); value && !(*value)->constantColour())
+      return *value;
   const Rgb constant = colour(name, fallback);
   // Negated, so that it holds for what is no number.
   if (!((constant >= 0.0f).all() && constant.allFinite()))

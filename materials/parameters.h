@@ -49,12 +49,15 @@ class Parameters {
   bool holdsText(std::string_view name) const;
   /// The same for what may be a number or a texture.
   bool holdsTexture(std::string_view name) const;
+  /// Whether it is a texture of more than one colour.
+  bool varies(std::string_view name) const;
 
   // Each returns the fallback when there is no such parameter and throws ParameterError when it has another type.
   bool flag(std::string_view name, bool fallback) const;
   double number(std::string_view name, double fallback) const;
   std::string text(std::string_view name, std::string fallback) const;
-  Rgb colour(std::string_view name, const Rgb& fallback) const;  ///< from rgb, or a number as grey
+  /// From rgb, a number as grey, or a texture that is the same colour everywhere.
+  Rgb colour(std::string_view name, const Rgb& fallback) const;
   /// From texture, rgb or number; ParameterError also where one of the latter is negative or not finite.
   TexturePtr texture(std::string_view name, const Rgb& fallback) const;
   Eigen::Matrix4d transform(std::string_view name) const;  ///< identity when missing

@@ -31,7 +31,7 @@ struct Rates {
 };
 
 float weightOf(const TexturePtr& texture, const Vec2& uv) {
-  return std::clamp(luminance(texture->eval(uv)), 0.0f, 1.0f);
+  return std::clamp(texture->evalNumber(uv), 0.0f, 1.0f);
 }
 
 /// α of the interface along local x and y.

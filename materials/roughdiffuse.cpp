@@ -165,7 +165,7 @@ class RoughDiffuse final : public Bsdf {
 
  private:
   Coefficients coefficients(const Vec2& uv) const {
-    return coefficientsOf(std::max(0.0f, luminance(alpha_->eval(uv))), fast_);
+    return coefficientsOf(std::max(0.0f, alpha_->evalNumber(uv)), fast_);
   }
 
   float evenShare(const Vec2& uv) const {

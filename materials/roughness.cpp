@@ -82,8 +82,8 @@ Roughness::Roughness(Microfacet::Kind kind, TexturePtr alphaU, TexturePtr alphaV
 
 LocalRoughness Roughness::at(const Vec2& uv) const {
   if (!texturedU_) return {levels_[0]};
-  const double u = clampedAlpha(luminance(texturedU_->eval(uv)));
-  const double v = texturedV_ == texturedU_ ? u : clampedAlpha(luminance(texturedV_->eval(uv)));
+  const double u = clampedAlpha(texturedU_->evalNumber(uv));
+  const double v = texturedV_ == texturedU_ ? u : clampedAlpha(texturedV_->evalNumber(uv));
   const double last = static_cast<double>(levels_.size() - 1);
   const double level = std::clamp(levelOfRoughness(std::sqrt(u * v)) - lowest_, 0.0, last);
   const double below = std::floor(level);

@@ -6,7 +6,8 @@
 #include <numbers>
 #include <span>
 
-#include "scenes/spectra.h"
+#include "materials/xyz.h"
+#include "scenes/cie_tables.h"
 
 namespace lobe {
 namespace {

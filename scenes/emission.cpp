@@ -34,10 +34,13 @@ double emissionScale(const Parameters& parameters, const char* name, double fall
   return scale;
 }
 
-void noteSamplingWeight(ReadContext& context, pugi::xml_node node, const Parameters& parameters) {
-  if (!parameters.has("sampling_weight")) return;
-  parameters.number("sampling_weight", 1.0);
+double readSamplingWeight(ReadContext& context, pugi::xml_node node, const Parameters& parameters) {
+  if (!parameters.has("sampling_weight")) return 1.0;
+  const double weight = parameters.number("sampling_weight", 1.0);
+  if (!(weight >= 0.0))
+    throw ParameterError("sampling_weight", fmt::format("sampling_weight must not be negative, but is {}", weight));
   context.findings.noteWithoutEffect(describe(node), "sampling_weight");
+  return weight;
 }
 
 }  // namespace lobe

@@ -14,7 +14,8 @@ Rgb emission(const Parameters& parameters, const char* name, const Rgb& fallback
 TexturePtr emissionTexture(const Parameters& parameters, const char* name, const Rgb& fallback);
 double emissionScale(const Parameters& parameters, const char* name, double fallback);
 
-/// Lights are chosen by power, whatever the file would have: sampling_weight is noted as of no effect.
-void noteSamplingWeight(ReadContext& context, pugi::xml_node node, const Parameters& parameters);
+/// Lights are chosen by power, whatever the file would have: sampling_weight is noted as of no effect. What matters is
+/// whether it is 0, as nothing but sampling finds light from a point. 1 when there is none. Throws ParameterError.
+double readSamplingWeight(ReadContext& context, pugi::xml_node node, const Parameters& parameters);
 
 }  // namespace lobe

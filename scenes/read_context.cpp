@@ -1,6 +1,7 @@
 #include "scenes/read_context.h"
 
 #include <algorithm>
+#include <array>
 
 #include <fmt/format.h>
 
@@ -37,7 +38,10 @@ std::string describe(pugi::xml_node node) {
 }
 
 std::string_view elementName(pugi::xml_node node) {
+  constexpr std::array<std::string_view, 6> kColours = {"rgb", "srgb", "color", "xyz", "spectrum", "blackbody"};
   const std::string_view name = node.name();
+  if (node.attribute("type") && !node.attribute("value") && std::ranges::find(kColours, name) != kColours.end())
+    return "texture";
   if (name == "camera") return "sensor";
   if (name == "luminaire") return "emitter";
   if (name == "lookAt" || name == "look_at") return "lookat";

@@ -46,7 +46,8 @@ std::string typeOf(const ReadContext& context, pugi::xml_node node);
 /// "bsdf \"plastic\"", or "scene" for an element without type.
 std::string describe(pugi::xml_node node);
 
-/// Name of the element, in today's spelling: camera is sensor, luminaire emitter (Mitsuba 0.4), lookAt lookat.
+/// Name of the element, in today's spelling: camera is sensor, luminaire emitter (Mitsuba 0.4), lookAt lookat; a colour
+/// with a type and no value, such as <spectrum type="d65">, is a texture, as Mitsuba goes by the type alone.
 std::string_view elementName(pugi::xml_node node);
 
 /// Fails when the node is text, at its first word: scene files keep everything in attributes.

@@ -70,7 +70,30 @@ Eigen::Vector3d stretched(const Eigen::Vector3d& direction, double stretch) {
   return {direction.x() * factor, std::cos(polar), direction.z() * factor};
 }
 
+/// In radians: Mitsuba 0.6 scales that of the sun, Mitsuba 3 takes an angle over the disc in degrees. Both keep what
+/// light comes from it.
+double readSunRadius(const Parameters& parameters) {
+  constexpr double kDegree = std::numbers::pi / 180;
+  if (!parameters.has("sun_aperture"))
+    return within(parameters, "sun_radius_scale", 1, 0, std::floor(90 * kDegree / sunRadius())) * sunRadius();
+  if (parameters.has("sun_radius_scale"))
+    throw ParameterError("sun_aperture", "give either sun_aperture or sun_radius_scale");
+  return 0.5 * within(parameters, "sun_aperture", 0, 0, 180) * kDegree;
+}
+
 }  // namespace
+
+/// What would change the picture, where it is asked for.
+void DaylightReader::checkSwitches(pugi::xml_node node, const Parameters& parameters, const std::string& type) {
+  const auto refuse = [&](const char* name, const char* what) {
+    if (parameters.flag(name, false))
+      context_.unsupported(parameters.location(name), fmt::format("{} of {}", name, type),
+                           fmt::format("{}: {} is not supported: {}", describe(node), name, what),
+                           fmt::format("{} is ignored", name));
+  };
+  if (type != "sun") refuse("extend", "there is no sky below the horizon");
+  if (type != "sky") refuse("complex_sun", "the sun's disc is equally bright everywhere");
+}
 
 bool DaylightReader::knows(std::string_view type) {
   return std::ranges::find(kTypes, type) != kTypes.end();
@@ -81,6 +104,8 @@ void DaylightReader::add(pugi::xml_node node, const Parameters& parameters, cons
 }
 
 bool DaylightReader::read(pugi::xml_node node, const Parameters& parameters, const std::string& type) {
+  readSamplingWeight(context_, node, parameters);
+  checkSwitches(node, parameters, type);
   const Eigen::Matrix3d toWorld = rotationOf(parameters, "to_world").cast<double>();
   const double turbidity = within(parameters, "turbidity", 3, 1, 10);
   const double stretch = within(parameters, "stretch", 1, 1, 2);
@@ -90,12 +115,10 @@ bool DaylightReader::read(pugi::xml_node node, const Parameters& parameters, con
   const int width = integer(parameters, "resolution", 1024, 8, 1 << 14);
   const double skyScale = type == "sunsky" ? emissionScale(parameters, "sky_scale", scale) : scale;
   const double sunScale = type == "sunsky" ? emissionScale(parameters, "sun_scale", scale) : scale;
-  const double largest = 90 * std::numbers::pi / 180 / sunRadius();
-  const double radius =
-      type == "sky" ? 0 : within(parameters, "sun_radius_scale", 1, 0, std::floor(largest)) * sunRadius();
+  const double radius = type == "sky" ? 0 : readSunRadius(parameters);
   if (type != "sun" && parameters.has("albedo")) {
     parameters.colour("albedo", Rgb::Zero());
-    context_.note(fmt::format("{}: no effect of albedo, Preetham's model has none", describe(node)));
+    parameters.warn("albedo", "albedo is ignored: the sky is Preetham's, over black ground");
   }
   // Nothing is kept before everything has been read: what throws is read again.
   if (!any()) frame_ = toWorld;

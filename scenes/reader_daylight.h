@@ -20,6 +20,7 @@ class DaylightReader {
 
  private:
   bool read(pugi::xml_node node, const Parameters& parameters, const std::string& type);
+  void checkSwitches(pugi::xml_node node, const Parameters& parameters, const std::string& type);
   void addSun(const Eigen::Vector3d& world, const Rgb& radiance, double radius);
 
   ReadContext& context_;

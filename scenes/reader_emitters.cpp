@@ -8,8 +8,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "scenes/camera.h"
 #include "scenes/emission.h"
 #include "scenes/reader_parameters.h"
+#include "scenes/reader_sensor.h"
 #include "scenes/values.h"
 
 namespace lobe {
@@ -25,12 +27,12 @@ std::optional<Environment> makeFromImage(ReadContext& context, TextureReader& te
   Environment environment;
   environment.toWorld = rotationOf(parameters, "to_world");
   const auto scale = static_cast<float>(emissionScale(parameters, "scale", 1.0));
-  imageRequest(context, parameters);  // checks and uses its parameters, whether or not the image is wanted
+  const ImageRequest request = imageRequest(context, parameters);
   if (!context.options.geometry) return std::nullopt;
   const std::shared_ptr<const Image> image =
-      textures.images().get(context, node, parameters, "the emitter is left out");
+      textures.images().get(context, node, parameters, request, "the emitter is left out");
   if (!image) return std::nullopt;
-  environment.radiance = *withoutFaults(context, node, parameters, image, Sign::positive);
+  environment.radiance = *withoutFaults(context, node, request, image, Sign::positive);
   for (Rgb& pixel : environment.radiance.pixels) pixel *= scale;
   if (std::ranges::any_of(environment.radiance.pixels, [](const Rgb& p) { return !(p <= kLargestEmission).all(); }))
     throw ParameterError("filename", fmt::format("the image has pixels over {:g}", kLargestEmission));
@@ -54,6 +56,28 @@ PointLight makePoint(const Parameters& parameters) {
   return {readPosition(parameters), emission(parameters, "intensity", grey(1.0f))};
 }
 
+/// The texture that a light in this frame projects: u grows by perX along the frame's x at distance 1, v by perY along
+/// y.
+ProjectedTexture makeProjected(TexturePtr texture, const Eigen::Matrix4f& frame, double perX, double perY) {
+  const Vec3 x = frame.block<3, 1>(0, 0).normalized(), y = frame.block<3, 1>(0, 1).normalized();
+  // Negated, so that it holds for what is no number.
+  if (!(x.norm() > 0.0f && y.norm() > 0.0f))
+    throw ParameterError("to_world", "the transform of a light with a texture must not be singular");
+  return {std::move(texture), x * static_cast<float>(perX), y * static_cast<float>(perY)};
+}
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+/// The texture fills the square around the cone. cutoff: in degrees.
+std::optional<ProjectedTexture> makeSpotTexture(const Parameters& parameters, const Eigen::Matrix4f& frame,
+                                                double cutoff) {
+  if (!parameters.has("texture")) return std::nullopt;
+  if (!(cutoff < 90.0))
+    throw ParameterError("texture", fmt::format("a texture needs a cutoff_angle below 90 degrees, not {}", cutoff));
+  const double perUnit = 0.5 / std::tan(cutoff * kDegree);
+  return makeProjected(emissionTexture(parameters, "texture", grey(1.0f)), frame, perUnit, perUnit);
+}
+
 SpotLight makeSpot(const Parameters& parameters) {
   const Eigen::Matrix4f frame = toWorld(parameters);
   const double cutoff = parameters.number("cutoff_angle", 20.0);
@@ -64,10 +88,27 @@ SpotLight makeSpot(const Parameters& parameters) {
   if (!(beam >= 0.0 && beam <= cutoff))
     throw ParameterError("beam_width",
                          fmt::format("beam_width must be between 0 and the cutoff_angle, {}, not {}", cutoff, beam));
-  constexpr double kDegree = std::numbers::pi / 180.0;
+  return {frame.topRightCorner<3, 1>(),
+          readAxis(parameters, frame.block<3, 1>(0, 2)),
+          emission(parameters, "intensity", grey(1.0f)),
+          static_cast<float>(cutoff * kDegree),
+          static_cast<float>(beam * kDegree),
+          makeSpotTexture(parameters, frame, cutoff)};
+}
+
+/// As a camera sees: the first pixel of the image is at +x and +y.
+ProjectorLight makeProjector(const Parameters& parameters) {
+  if (!parameters.has("irradiance")) throw ParameterError("", "the parameter \"irradiance\" is needed");
+  TexturePtr irradiance = emissionTexture(parameters, "irradiance", grey(1.0f));
+  const auto [width, height] = irradiance->resolution();
+  Camera camera;
+  readFieldOfView(parameters, camera);
+  const double tangent = std::tan(0.5 * horizontalFov(camera, width, height) * kDegree);
+  const Eigen::Matrix4f frame = toWorld(parameters);
+  const double perX = -0.5 / tangent, perY = perX * width / height;
   return {frame.topRightCorner<3, 1>(), readAxis(parameters, frame.block<3, 1>(0, 2)),
-          emission(parameters, "intensity", grey(1.0f)), static_cast<float>(cutoff * kDegree),
-          static_cast<float>(beam * kDegree)};
+          static_cast<float>(emissionScale(parameters, "scale", 1.0)),
+          makeProjected(std::move(irradiance), frame, perX, perY)};
 }
 
 DirectionalLight makeDirectional(const Parameters& parameters) {
@@ -80,25 +121,14 @@ DirectionalLight makeDirectional(const Parameters& parameters) {
 
 DeltaLight makeDelta(const std::string& type, const Parameters& parameters) {
   if (type == "point") return makePoint(parameters);
+  if (type == "projector") return makeProjector(parameters);
   if (type == "spot") return makeSpot(parameters);
   return makeDirectional(parameters);
 }
 
-constexpr std::array<std::string_view, 3> kDeltaTypes = {"directional", "point", "spot"};
-constexpr std::array<std::string_view, 9> kTypes = {"area", "constant", "directional", "envmap", "point",
-                                                    "sky",  "spot",     "sun",         "sunsky"};
-
-Parameters readEmitterParameters(ReadContext& context, pugi::xml_node node, const std::string& type) {
-  const auto refuseTexture = [&](pugi::xml_node child, const std::string&, Parameters&) {
-    if (type != "spot" || elementName(child) != "texture") return false;
-    context.unsupported(child, "texture of a spot", "a spot's texture is not supported: it shines evenly",
-                        "the texture is left out");
-    return true;
-  };
-  Parameters parameters = readParameters(context, node, "", refuseTexture);
-  noteSamplingWeight(context, node, parameters);
-  return parameters;
-}
+constexpr std::array<std::string_view, 4> kDeltaTypes = {"directional", "point", "projector", "spot"};
+constexpr std::array<std::string_view, 10> kTypes = {"area",      "constant", "directional", "envmap", "point",
+                                                     "projector", "sky",      "spot",        "sun",    "sunsky"};
 
 }  // namespace
 
@@ -115,7 +145,9 @@ void EmitterReader::add(pugi::xml_node node) {
                          "the emitter is left out");
     return;
   }
-  const Parameters parameters = readEmitterParameters(context_, node, type);
+  const Parameters parameters = readParameters(
+      context_, node, "texture",
+      [this](pugi::xml_node child, const std::string& name, Parameters& p) { return textures_.take(child, name, p); });
   if (std::ranges::find(kDeltaTypes, type) != kDeltaTypes.end())
     addDelta(node, parameters, type);
   else
@@ -123,9 +155,14 @@ void EmitterReader::add(pugi::xml_node node) {
 }
 
 void EmitterReader::addDelta(pugi::xml_node node, const Parameters& parameters, const std::string& type) {
-  const DeltaLight light =
-      makeFrom(context_, node, parameters, [&](const Parameters& p) { return makeDelta(type, p); });
-  if (context_.options.geometry) context_.scene.lights.push_back(light);
+  double weight = 1.0;
+  const DeltaLight light = makeFrom(context_, node, parameters, [&](const Parameters& p) {
+    weight = readSamplingWeight(context_, node, p);
+    if (weight == 0.0)
+      p.warn("sampling_weight", "with a sampling_weight of 0, nothing finds this light: it is left out");
+    return makeDelta(type, p);
+  });
+  if (context_.options.geometry && weight > 0.0) context_.scene.lights.push_back(light);
 }
 
 void EmitterReader::addDistant(pugi::xml_node node, const Parameters& parameters, const std::string& type) {
@@ -136,6 +173,7 @@ void EmitterReader::addDistant(pugi::xml_node node, const Parameters& parameters
   if (daylight) return daylight_.add(node, parameters, type);
   environment_ = true;
   std::optional<Environment> environment = makeFrom(context_, node, parameters, [&](const Parameters& p) {
+    readSamplingWeight(context_, node, p);
     return type == "constant" ? makeConstant(p) : makeFromImage(context_, textures_, node, p);
   });
   if (context_.options.geometry && environment) context_.scene.environment = std::move(environment);

@@ -18,16 +18,24 @@ namespace lobe {
 struct ImageRequest {
   std::filesystem::path path;
   Encoding encoding;
+  bool alpha = false;  ///< of its alpha channel alone
 };
 
-/// From the parameters filename, raw and gamma (1 is linear, −1 sRGB) of a bitmap or environment map.
+/// From the parameters filename, raw and gamma (1 is linear, −1 sRGB, 0 what the file says) of an environment map. In
+/// files for Mitsuba 0.6, 0 is what there is without a gamma.
 ImageRequest imageRequest(const ReadContext& context, const Parameters& parameters);
+
+/// The same for a bitmap, which may have a channel, too.
+ImageRequest bitmapRequest(const ReadContext& context, const Parameters& parameters);
+
+/// The parameter channel in small letters; empty when there is none.
+std::string channelOf(const Parameters& parameters);
 
 /// What an image's numbers may be.
 enum class Sign { positive, any };
 
 /// The image with black for pixels that are not finite or not of this sign, and a note when there are any.
-std::shared_ptr<const Image> withoutFaults(ReadContext& context, pugi::xml_node node, const Parameters& parameters,
+std::shared_ptr<const Image> withoutFaults(ReadContext& context, pugi::xml_node node, const ImageRequest& request,
                                            std::shared_ptr<const Image> image, Sign sign);
 
 class ImageStore {
@@ -38,10 +46,10 @@ class ImageStore {
 
   /// nullptr when the file is missing and that is tolerated. SceneError at the filename parameter.
   std::shared_ptr<const Image> get(ReadContext& context, pugi::xml_node node, const Parameters& parameters,
-                                   const std::string& remedy);
+                                   const ImageRequest& request, const std::string& remedy);
 
  private:
-  using Key = std::tuple<std::filesystem::path, Encoding::Kind, float>;
+  using Key = std::tuple<std::filesystem::path, Encoding::Kind, float, bool>;
   struct Entry {
     std::shared_ptr<const Image> image;
     std::string fault;

@@ -23,10 +23,13 @@ std::uint64_t fingerprintOf(const std::string& type, const Parameters& parameter
   return hash.value();
 }
 
-/// What Mitsuba 3 changed: a metal that is not named is a perfect mirror (η 0, k 1) rather than copper.
+/// What Mitsuba 3 changed: a metal that is not named is a perfect mirror (η 0, k 1) rather than copper, and the opacity
+/// of a mask is a number rather than a colour.
 void setDefaultsOfToday(const std::string& type, Parameters& parameters) {
   if ((type == "conductor" || type == "roughconductor") && !parameters.has("material"))
     parameters.set("material", std::string("none"));
+  if (type == "mask" && parameters.varies("opacity"))
+    parameters.set("opacity", numbersOf(parameters.texture("opacity", grey(1.0f))), parameters.location("opacity"));
 }
 
 bool namesMeasurement(pugi::xml_node node) {

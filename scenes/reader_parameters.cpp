@@ -1,7 +1,6 @@
 #include "scenes/reader_parameters.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -10,9 +9,8 @@
 #include <fmt/ranges.h>
 #include <Eigen/LU>
 
-#include "scenes/mesh_file.h"
-#include "scenes/spectra.h"
-#include "scenes/transforms.h"
+#include "scenes/reader_colours.h"
+#include "scenes/reader_values.h"
 #include "scenes/values.h"
 
 namespace lobe {
@@ -21,8 +19,6 @@ namespace {
 constexpr std::string_view kValueElements =
     "float, integer, boolean, string, rgb, srgb, xyz, spectrum, blackbody, point, vector, transform";
 
-constexpr std::array<std::string_view, 6> kColours = {"rgb", "srgb", "color", "xyz", "spectrum", "blackbody"};
-
 /// Parameters of Mitsuba's that do not change what a picture converges to: how things are stored and found, and what
 /// belongs to other integrators, to files that we do not write, or to motion, which we do not read. An element without
 /// a type stands for all its types; * stands for all names.
@@ -30,8 +26,6 @@ constexpr std::pair<std::string_view, std::string_view> kWithoutEffect[] = {
     {"texture \"bitmap\"", "accel, cache, format, max_anisotropy"},
     {"emitter \"constant\"", "to_world"},
     {"emitter \"envmap\"", "cache, mis_compensation"},
-    {"emitter \"sky\"", "extend"},
-    {"emitter \"sunsky\"", "complex_sun, extend, sun_aperture"},
     {"bsdf \"normalmap\"", "flip_invalid_normals, use_shadowing_function"},
     {"film",
      "attach_log, banner, burn, channel_names, component_format, compression, digits, exposure, file_format, filename, "
@@ -51,70 +45,6 @@ bool hasNoEffect(const std::string& owner, std::string_view name) {
   return false;
 }
 
-std::string text(const ReadContext& context, pugi::xml_node node) {
-  checkAttributes(context, node, {"name", "value", "intent"});
-  const pugi::xml_attribute value = node.attribute("value");
-  if (!value) context.file.fail(node, fmt::format("<{}> needs a value", node.name()));
-  return value.value();
-}
-
-template <typename T>
-T parsed(const ReadContext& context, pugi::xml_node node, std::optional<T> (*parse)(std::string_view),
-         std::string_view wanted) {
-  const std::string value = text(context, node);
-  if (std::optional<T> result = parse(value)) return *result;
-  context.file.fail(node,
-                    fmt::format("\"{}\" is not {} (parameter \"{}\")", value, wanted, node.attribute("name").value()));
-}
-
-std::optional<Rgb> parseRgb(std::string_view text) {
-  return text.find('#') == std::string_view::npos ? parseColour(text) : parseSrgb(text);
-}
-
-std::optional<Rgb> parseXyz(std::string_view text) {
-  const auto values = parseNumbers(text);
-  if (!values || values->size() != 3) return std::nullopt;
-  return rgbOfXyz(Eigen::Vector3d(values->data()));
-}
-
-std::optional<Rgb> parseSpectrumOrColour(std::string_view text) {
-  if (const std::optional<SpectrumPoints> points = parseSpectrum(text)) return rgbOfSpectrum(*points);
-  return parseColour(text);
-}
-
-Rgb readSpectrumFile(const ReadContext& context, pugi::xml_node node) {
-  const std::filesystem::path path =
-      context.file.resolve(node.attribute("filename").value(), SceneFile::location(node));
-  try {
-    if (const std::optional<SpectrumPoints> points = parseSpectrumFile(readBytes(path))) return rgbOfSpectrum(*points);
-  } catch (const std::runtime_error& error) {
-    context.file.fail(node, fmt::format("<spectrum>: {}: {}", path.string(), error.what()));
-  }
-  context.file.fail(
-      node, fmt::format("<spectrum>: {} does not hold lines of a wavelength, rising, and a value", path.string()));
-}
-
-Rgb readBlackbody(const ReadContext& context, pugi::xml_node node) {
-  checkAttributes(context, node, {"name", "temperature", "scale"});
-  std::string_view temperature = node.attribute("temperature").value();
-  if (temperature.ends_with('K') || temperature.ends_with('k')) temperature.remove_suffix(1);
-  const std::optional<double> kelvin = parseNumber(temperature);
-  const std::optional<double> scale = parseNumber(node.attribute("scale").as_string("1"));
-  if (!kelvin || !(*kelvin >= 100 && *kelvin <= 1e6) || !scale)
-    context.file.fail(node, "<blackbody> needs a temperature from 100 to 1e6 such as 5000K, and a number as scale");
-  return rgbOfBlackbody(*kelvin) * static_cast<float>(*scale);
-}
-
-Rgb readColour(const ReadContext& context, pugi::xml_node node, std::string_view tag) {
-  if (tag == "srgb") return parsed<Rgb>(context, node, parseSrgb, "one or three numbers or #rrggbb");
-  if (tag == "xyz") return parsed<Rgb>(context, node, parseXyz, "three numbers");
-  if (tag == "blackbody") return readBlackbody(context, node);
-  if (tag != "spectrum") return parsed<Rgb>(context, node, parseRgb, "one or three numbers or #rrggbb");
-  if (node.attribute("filename")) return readSpectrumFile(context, node);
-  return parsed<Rgb>(context, node, parseSpectrumOrColour,
-                     "one or three numbers, or pairs of wavelength:value, rising");
-}
-
 Rgb readPoint(const ReadContext& context, pugi::xml_node node) {
   checkAttributes(context, node, {"name", "x", "y", "z", "value"});
   return readVector(context, node, 0).cast<float>().array();
@@ -123,11 +53,11 @@ Rgb readPoint(const ReadContext& context, pugi::xml_node node) {
 /// nullopt: not an element that holds a value.
 std::optional<ParameterValue> readValue(ReadContext& context, pugi::xml_node node) {
   const std::string_view tag = node.name();
-  if (tag == "float") return parsed<double>(context, node, parseNumber, "a number");
-  if (tag == "integer") return static_cast<double>(parsed<int>(context, node, parseInteger, "an integer"));
-  if (tag == "boolean") return parsed<bool>(context, node, parseBoolean, "true or false");
-  if (tag == "string") return text(context, node);
-  if (std::ranges::find(kColours, tag) != kColours.end()) return readColour(context, node, tag);
+  if (tag == "float") return parsedValue<double>(context, node, parseNumber, "a number");
+  if (tag == "integer") return static_cast<double>(parsedValue<int>(context, node, parseInteger, "an integer"));
+  if (tag == "boolean") return parsedValue<bool>(context, node, parseBoolean, "true or false");
+  if (tag == "string") return valueText(context, node);
+  if (const std::optional<Rgb> colour = readColour(context, node)) return *colour;
   if (tag == "point" || tag == "vector") return readPoint(context, node);
   if (tag == "transform") return readTransform(context, node);
   return std::nullopt;

@@ -115,6 +115,8 @@ float fieldOfViewOf(const std::string& focalLength) {
   return static_cast<float>(2.0 * std::atan(std::hypot(36.0, 24.0) / (2.0 * *millimetres)) * 180.0 / std::numbers::pi);
 }
 
+}  // namespace
+
 void readFieldOfView(const Parameters& parameters, Camera& camera) {
   if (!parameters.has("fov")) {
     camera.fov = fieldOfViewOf(parameters.text("focal_length", "50mm"));
@@ -131,6 +133,8 @@ void readFieldOfView(const Parameters& parameters, Camera& camera) {
     throw ParameterError("fov_axis",
                          fmt::format("unknown fov_axis \"{}\"; known are {}", camera.fovAxis, fmt::join(kAxes, ", ")));
 }
+
+namespace {
 
 void readLens(const Parameters& parameters, Camera& camera) {
   if (!parameters.has("aperture_radius")) throw ParameterError("", "the parameter \"aperture_radius\" is needed");

@@ -203,9 +203,10 @@ void ShapeReader::takeEmitter(pugi::xml_node node, Parts& parts) {
   const Parameters parameters = readParameters(
       context_, node, "texture",
       [this](pugi::xml_node child, const std::string& name, Parameters& p) { return textures_.take(child, name, p); });
-  noteSamplingWeight(context_, node, parameters);
-  parts.emitter = makeFrom(context_, node, parameters,
-                           [](const Parameters& p) { return AreaEmitter{emissionTexture(p, "radiance", grey(1.0f))}; });
+  parts.emitter = makeFrom(context_, node, parameters, [&](const Parameters& p) {
+    readSamplingWeight(context_, node, p);
+    return AreaEmitter{emissionTexture(p, "radiance", grey(1.0f))};
+  });
 }
 
 ShapeReader::Mesh ShapeReader::makeMesh(const std::string& type, const Parameters& parameters,

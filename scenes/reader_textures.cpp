@@ -1,12 +1,13 @@
 #include "scenes/reader_textures.h"
 
 #include <algorithm>
+#include <cctype>
 
 #include <fmt/format.h>
 
 #include "materials/bitmap.h"
 #include "materials/checkerboard.h"
-#include "materials/fingerprint.h"
+#include "scenes/reader_colours.h"
 #include "scenes/reader_parameters.h"
 #include "scenes/values.h"
 
@@ -15,31 +16,6 @@ namespace {
 
 /// What takes the place of a texture that cannot be had.
 constexpr float kPlainGrey = 0.5f;
-
-class ScaledTexture final : public Texture {
- public:
-  ScaledTexture(TexturePtr nested, const Rgb& scale) : nested_(std::move(nested)), scale_(scale) {}
-  Rgb eval(const Vec2& uv) const override { return nested_->eval(uv) * scale_; }
-  Rgb mean() const override { return nested_->mean() * scale_; }
-  TextureRange range() const override {
-    const TextureRange nested = nested_->range();
-    const float low = scale_.minCoeff(), high = scale_.maxCoeff();
-    const auto [smallest, largest] =
-        std::minmax({low * nested.smallest, low * nested.largest, high * nested.smallest, high * nested.largest});
-    return {smallest, largest};
-  }
-  std::uint64_t fingerprint() const override {
-    Fingerprint hash;
-    hash.text("scale");
-    hash.number(nested_->fingerprint());
-    hash.coefficients(scale_);
-    return hash.value();
-  }
-
- private:
-  TexturePtr nested_;
-  Rgb scale_;
-};
 
 /// Mitsuba 0.6's four numbers, or Mitsuba 3's transform in the plane.
 UvMap readUvMap(const Parameters& parameters) {
@@ -59,18 +35,21 @@ Wrap parseWrap(const std::string& parameter, const std::string& mode) {
   if (mode == "repeat") return Wrap::repeat;
   if (mode == "mirror") return Wrap::mirror;
   if (mode == "clamp") return Wrap::clamp;
-  if (mode == "zero") return Wrap::zero;
-  if (mode == "one") return Wrap::one;
-  throw ParameterError(
-      parameter, fmt::format("unknown wrap mode \"{}\"; {}", mode, knownAre(mode, "repeat, mirror, clamp, zero, one")));
+  if (mode == "zero" || mode == "black") return Wrap::zero;
+  if (mode == "one" || mode == "white") return Wrap::one;
+  throw ParameterError(parameter, fmt::format("unknown wrap mode \"{}\"; {}", mode,
+                                              knownAre(mode, "repeat, mirror, clamp, zero, one, black, white")));
 }
 
 bool readNearest(const Parameters& parameters) {
-  const std::string filter = parameters.text("filter_type", "bilinear");
-  // Without ray differentials, what prefilters is bilinear.
-  if (filter != "nearest" && filter != "bilinear" && filter != "trilinear" && filter != "ewa")
+  std::string filter = parameters.text("filter_type", "bilinear");
+  std::ranges::transform(filter, filter.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const bool prefilters = filter == "trilinear" || filter == "ewa";
+  if (filter != "nearest" && filter != "bilinear" && !prefilters)
     throw ParameterError("filter_type",
                          fmt::format("unknown filter \"{}\"; known are nearest, bilinear, trilinear, ewa", filter));
+  // Samples average over a pixel what these average beforehand.
+  if (prefilters) parameters.note(fmt::format("filter_type {} is taken for bilinear", filter));
   return filter == "nearest";
 }
 
@@ -86,26 +65,29 @@ BitmapOptions readBitmapOptions(const Parameters& parameters) {
   return options;
 }
 
-/// The image, or a grey one of the channel that the parameters choose.
-std::shared_ptr<const Image> chosenChannel(const Parameters& parameters, std::shared_ptr<const Image> image) {
+/// The image, or a grey one of the channel that is chosen. That of alpha has been read as such.
+std::shared_ptr<const Image> chosenChannel(const std::string& channel, std::shared_ptr<const Image> image) {
   constexpr std::string_view kChannels = "rgb";
-  const std::string channel = parameters.text("channel", "");
-  if (channel.empty()) return image;
+  if (channel.empty() || channel == "a") return image;
   const std::size_t index = channel.size() == 1 ? kChannels.find(channel) : std::string_view::npos;
-  if (index == std::string_view::npos)
-    throw ParameterError("channel", fmt::format("unknown channel \"{}\"; known are r, g, b", channel));
+  if (index == std::string_view::npos && channel != "y")
+    throw ParameterError("channel", fmt::format("unknown channel \"{}\"; known are r, g, b, a, y", channel));
+  if (channel == "y" && !std::ranges::all_of(image->pixels, [](const Rgb& p) { return (p == p.x()).all(); }))
+    throw ParameterError("channel", "only grey images have a channel y; this one has r, g, b");
   auto chosen = std::make_shared<Image>(*image);
-  for (Rgb& pixel : chosen->pixels) pixel = grey(pixel[static_cast<Eigen::Index>(index)]);
+  if (index != std::string_view::npos)
+    for (Rgb& pixel : chosen->pixels) pixel = grey(pixel[static_cast<Eigen::Index>(index)]);
   return chosen;
 }
 
-TexturePtr makeCheckerboardFrom(const Parameters& parameters) {
+TexturePtr makeCheckerboardFrom(const ReadContext& context, const Parameters& parameters) {
+  const NumberSquares numbers = context.file.isOfToday() ? NumberSquares::exchanged : NumberSquares::asColours;
   return makeCheckerboard(parameters.texture("color0", grey(0.4f)), parameters.texture("color1", grey(0.2f)),
-                          readUvMap(parameters));
+                          readUvMap(parameters), numbers);
 }
 
 TexturePtr makeScaled(const Parameters& parameters) {
-  return std::make_shared<ScaledTexture>(parameters.onlyTexture(), parameters.colour("scale", grey(1.0f)));
+  return scaledTexture(parameters.onlyTexture(), parameters.colour("scale", grey(1.0f)));
 }
 
 }  // namespace
@@ -135,11 +117,11 @@ bool TextureReader::take(pugi::xml_node child, const std::string& name, Paramete
 
 TexturePtr TextureReader::make(pugi::xml_node node, Encoded encoded) {
   const std::string type = typeOf(context_, node);
-  if (type != "bitmap" && type != "checkerboard" && type != "scale") {
-    context_.unsupported(
-        node, "texture " + type,
-        fmt::format("unknown texture type \"{}\"; {}", type, knownAre(type, "bitmap, checkerboard, scale")),
-        "grey is used");
+  if (type != "bitmap" && type != "checkerboard" && type != "scale" && !isSpectrum(type)) {
+    context_.unsupported(node, "texture " + type,
+                         fmt::format("unknown texture type \"{}\"; {}", type,
+                                     knownAre(type, "bitmap, checkerboard, scale, " + knownSpectra())),
+                         "grey is used");
     return constantTexture(grey(kPlainGrey));
   }
   Parameters parameters = readParameters(
@@ -147,18 +129,20 @@ TexturePtr TextureReader::make(pugi::xml_node node, Encoded encoded) {
       [&](pugi::xml_node child, const std::string& name, Parameters& p) { return take(child, name, p, encoded); });
   if (type == "bitmap" && encoded == Encoded::linear) parameters.set("raw", true, parameters.location("raw"));
   return makeFrom(context_, node, parameters, [&](const Parameters& p) {
-    if (type == "checkerboard") return makeCheckerboardFrom(p);
+    if (isSpectrum(type)) return makeSpectrum(context_, node, type, p);
+    if (type == "checkerboard") return makeCheckerboardFrom(context_, p);
     return type == "scale" ? makeScaled(p) : makeFromBitmap(node, p, encoded);
   });
 }
 
 TexturePtr TextureReader::makeFromBitmap(pugi::xml_node node, const Parameters& parameters, Encoded encoded) {
   const BitmapOptions options = readBitmapOptions(parameters);
-  std::shared_ptr<const Image> image = images_.get(context_, node, parameters, "grey is used");
+  const ImageRequest request = bitmapRequest(context_, parameters);
+  std::shared_ptr<const Image> image = images_.get(context_, node, parameters, request, "grey is used");
   if (!image) return constantTexture(grey(kPlainGrey));
   const Sign sign = encoded == Encoded::asGiven ? Sign::positive : Sign::any;
-  image = withoutFaults(context_, node, parameters, std::move(image), sign);
-  return makeBitmap(chosenChannel(parameters, std::move(image)), options);
+  image = withoutFaults(context_, node, request, std::move(image), sign);
+  return makeBitmap(chosenChannel(channelOf(parameters), std::move(image)), options);
 }
 
 }  // namespace lobe

@@ -16,7 +16,7 @@ class TextureReader {
  public:
   explicit TextureReader(ReadContext& context) : context_(context), images_(context) {}
 
-  /// bitmap, checkerboard or scale; each element is read once for each encoding. Throws SceneError.
+  /// bitmap, checkerboard, scale or a spectrum; each element is read once for each encoding. Throws SceneError.
   TexturePtr read(pugi::xml_node node, Encoded encoded = Encoded::asGiven);
   ImageStore& images() { return images_; }
 

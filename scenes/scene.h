@@ -98,14 +98,35 @@ struct PointLight {
   Rgb intensity;  ///< power per solid angle
 };
 
+/// A texture in the way of light from a point. On the plane at distance 1 along the light's axis, the point at an
+/// offset o from the axis has the texture coordinates (½ + u·o, ½ + v·o).
+struct ProjectedTexture {
+  TexturePtr texture;
+  Vec3 u, v;  ///< world space, at right angles to the axis and to each other
+
+  Vec2 uvOf(const Vec3& axis, const Vec3& direction) const {
+    return Vec2(u.dot(direction), v.dot(direction)) / axis.dot(direction) + Vec2::Constant(0.5f);
+  }
+};
+
 /// A cone of light from a point: of full intensity up to beamWidth from its axis, then falling linearly with the angle
 /// to nothing at the cutoff (Mitsuba's).
 struct SpotLight {
   Vec3 position;
-  Vec3 direction;   ///< unit, the axis
-  Rgb intensity;    ///< power per solid angle, on the axis
-  float cutoff;     ///< half angle in radians, in (0, π]
-  float beamWidth;  ///< likewise, at most the cutoff
+  Vec3 direction;                                          ///< unit, the axis
+  Rgb intensity;                                           ///< power per solid angle, on the axis
+  float cutoff;                                            ///< half angle in radians, in (0, π]
+  float beamWidth;                                         ///< likewise, at most the cutoff
+  std::optional<ProjectedTexture> texture = std::nullopt;  ///< times the intensity; only where the cutoff is below π/2
+};
+
+/// Projects the unit square of a texture: on a plane at right angles to the axis, at distance 1, the irradiance is π
+/// times scale times the texture (Mitsuba's, so that a white plane there shows the texture).
+struct ProjectorLight {
+  Vec3 position;
+  Vec3 direction;  ///< unit, the axis
+  float scale;
+  ProjectedTexture image;
 };
 
 /// Parallel light from infinitely far.
@@ -115,7 +136,7 @@ struct DirectionalLight {
 };
 
 /// Lights that no ray can hit.
-using DeltaLight = std::variant<PointLight, SpotLight, DirectionalLight>;
+using DeltaLight = std::variant<PointLight, SpotLight, DirectionalLight, ProjectorLight>;
 
 /// A part of a film, in pixels from its top left corner.
 struct FilmCrop {

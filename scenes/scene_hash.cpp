@@ -7,7 +7,7 @@ namespace lobe {
 namespace {
 
 // To be raised when the same scene comes to mean another light.
-constexpr std::uint32_t kRevision = 1;
+constexpr std::uint32_t kRevision = 2;
 
 struct GeometryHash {
   Fingerprint& hash;
@@ -41,6 +41,11 @@ struct GeometryHash {
 struct LightHash {
   Fingerprint& hash;
 
+  void operator()(const ProjectedTexture& projected) const {
+    hash.number(projected.texture->fingerprint());
+    hash.coefficients(projected.u);
+    hash.coefficients(projected.v);
+  }
   void operator()(const PointLight& light) const {
     hash.coefficients(light.position);
     hash.coefficients(light.intensity);
@@ -51,10 +56,17 @@ struct LightHash {
     hash.coefficients(light.intensity);
     hash.number(light.cutoff);
     hash.number(light.beamWidth);
+    if (light.texture) (*this)(*light.texture);
   }
   void operator()(const DirectionalLight& light) const {
     hash.coefficients(light.direction);
     hash.coefficients(light.irradiance);
+  }
+  void operator()(const ProjectorLight& light) const {
+    hash.coefficients(light.position);
+    hash.coefficients(light.direction);
+    hash.number(light.scale);
+    (*this)(light.image);
   }
 };
 

@@ -4,29 +4,34 @@
 #include <cmath>
 #include <string>
 
+#include "materials/xyz.h"
+#include "scenes/cie_tables.h"
 #include "scenes/values.h"
 
 namespace lobe {
 namespace {
 
-// What the eye sees of, and the step of sums over it, in nm.
-constexpr double kShortest = 360, kLongest = 830, kStep = 1;
-
-double bell(double wavelength, double peak, double below, double above) {
-  const double t = (wavelength - peak) / (wavelength < peak ? below : above);
-  return std::exp(-0.5 * t * t);
-}
+constexpr double kStep = 1;  // of sums over wavelengths, nm
 
 template <class Spectrum>
 Eigen::Vector3d integrate(const Spectrum& spectrum) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (double nm = kShortest; nm <= kLongest; nm += kStep) sum += kStep * spectrum(nm) * colourMatching(nm);
+  for (double nm = kShortestWavelength; nm <= kLongestWavelength; nm += kStep)
+    sum += kStep * spectrum(nm) * colourMatching(nm);
   return sum;
 }
 
-const Eigen::Vector3d& equalEnergy() {
-  static const Eigen::Vector3d kXyz = integrate([](double) { return 1.0; });
-  return kXyz;
+/// By the luminance that equal energy has.
+template <class Spectrum>
+Rgb rgbOfEmission(const Spectrum& spectrum) {
+  static const double kEqualEnergy = integrate([](double) { return 1.0; }).y();
+  return rgbOfXyz(integrate(spectrum) / kEqualEnergy);
+}
+
+template <class Spectrum>
+Rgb rgbOfReflectance(const Spectrum& spectrum) {
+  static const Rgb kWhite = rgbOfXyz(integrate(daylight65));
+  return rgbOfXyz(integrate([&](double nm) { return spectrum(nm) * daylight65(nm); })) / kWhite;
 }
 
 double valueAt(const SpectrumPoints& points, double nm) {
@@ -37,29 +42,23 @@ double valueAt(const SpectrumPoints& points, double nm) {
   return std::lerp(y0, after->second, (nm - x0) / (after->first - x0));
 }
 
-std::optional<SpectrumPoints> risingPoints(const std::vector<double>& numbers) {
-  if (numbers.size() < 4 || numbers.size() % 2 != 0) return std::nullopt;
-  SpectrumPoints points;
-  for (std::size_t i = 0; i < numbers.size(); i += 2) {
-    if (!points.empty() && !(numbers[i] > points.back().first)) return std::nullopt;
-    points.emplace_back(numbers[i], numbers[i + 1]);
-  }
-  return points;
+/// Of wavelengths and values in turn.
+std::optional<SpectrumPoints> pairsOf(const std::vector<double>& numbers) {
+  std::vector<double> wavelengths, values;
+  for (std::size_t i = 0; i < numbers.size(); ++i) (i % 2 == 0 ? wavelengths : values).push_back(numbers[i]);
+  return spectrumOf(wavelengths, values);
 }
 
 }  // namespace
 
-Eigen::Vector3d colourMatching(double nm) {
-  return {
-      1.056 * bell(nm, 599.8, 37.9, 31.0) + 0.362 * bell(nm, 442.0, 16.0, 26.7) - 0.065 * bell(nm, 501.1, 20.4, 26.2),
-      0.821 * bell(nm, 568.8, 46.9, 40.5) + 0.286 * bell(nm, 530.9, 16.3, 31.1),
-      1.217 * bell(nm, 437.0, 11.8, 36.0) + 0.681 * bell(nm, 459.0, 26.0, 13.8)};
-}
-
-Rgb rgbOfXyz(const Eigen::Vector3d& xyz) {
-  const Eigen::Matrix3d toRgb{
-      {3.240479, -1.537150, -0.498535}, {-0.969256, 1.875991, 0.041556}, {0.055648, -0.204043, 1.057311}};
-  return (toRgb * xyz).cast<float>().array().max(0.0f);
+std::optional<SpectrumPoints> spectrumOf(const std::vector<double>& wavelengths, const std::vector<double>& values) {
+  if (wavelengths.size() < 2 || wavelengths.size() != values.size()) return std::nullopt;
+  SpectrumPoints points;
+  for (std::size_t i = 0; i < wavelengths.size(); ++i) {
+    if (i > 0 && !(wavelengths[i] > wavelengths[i - 1])) return std::nullopt;
+    points.emplace_back(wavelengths[i], values[i]);
+  }
+  return points;
 }
 
 std::optional<SpectrumPoints> parseSpectrum(std::string_view text) {
@@ -67,7 +66,7 @@ std::optional<SpectrumPoints> parseSpectrum(std::string_view text) {
   if (std::ranges::count(spaced, ':') == 0) return std::nullopt;
   std::ranges::replace(spaced, ':', ' ');
   const auto numbers = parseNumbers(spaced);
-  return numbers ? risingPoints(*numbers) : std::nullopt;
+  return numbers ? pairsOf(*numbers) : std::nullopt;
 }
 
 std::optional<SpectrumPoints> parseSpectrumFile(std::string_view text) {
@@ -78,11 +77,12 @@ std::optional<SpectrumPoints> parseSpectrumFile(std::string_view text) {
     if (!comment) bare += c;
   }
   const auto numbers = parseNumbers(bare);
-  return numbers ? risingPoints(*numbers) : std::nullopt;
+  return numbers ? pairsOf(*numbers) : std::nullopt;
 }
 
-Rgb rgbOfSpectrum(const SpectrumPoints& points) {
-  return rgbOfXyz(integrate([&](double nm) { return valueAt(points, nm); })) / rgbOfXyz(equalEnergy());
+Rgb rgbOfSpectrum(const SpectrumPoints& points, Illuminant illuminant) {
+  const auto value = [&](double nm) { return valueAt(points, nm); };
+  return illuminant == Illuminant::d65 ? rgbOfReflectance(value) : rgbOfEmission(value);
 }
 
 Rgb rgbOfBlackbody(double kelvin) {
@@ -92,7 +92,7 @@ Rgb rgbOfBlackbody(double kelvin) {
     const double exponent = kPlanck * kLight / (metres * kBoltzmann * kelvin);
     return 1e-9 * 2.0 * kPlanck * kLight * kLight / (std::pow(metres, 5) * std::expm1(exponent));
   };
-  return rgbOfXyz(integrate(radiance) / equalEnergy().y());
+  return rgbOfEmission(radiance);
 }
 
 }  // namespace lobe

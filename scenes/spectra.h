@@ -1,23 +1,14 @@
 #pragma once
 // Spectra as colours: linear Rec. 709, by the CIE 1931 observer.
 
-#include <functional>
 #include <optional>
 #include <string_view>
 #include <utility>
 #include <vector>
 
-#include <Eigen/Core>
-
 #include "materials/vec.h"
 
 namespace lobe {
-
-/// x̄, ȳ, z̄ at a wavelength in nm: the multi-lobe fit of Wyman, Sloan, Shirley 2013 (JCGT 2(2)).
-Eigen::Vector3d colourMatching(double wavelength);
-
-/// Without what is negative, which the primaries cannot show.
-Rgb rgbOfXyz(const Eigen::Vector3d& xyz);
 
 /// Wavelengths in nm, two or more and rising, each with its value.
 using SpectrumPoints = std::vector<std::pair<double, double>>;
@@ -26,12 +17,19 @@ using SpectrumPoints = std::vector<std::pair<double, double>>;
 std::optional<SpectrumPoints> parseSpectrum(std::string_view text);
 /// The same from a file of lines of two numbers, with comments after a #.
 std::optional<SpectrumPoints> parseSpectrumFile(std::string_view text);
+/// Wavelengths and their values, both in order; nullopt when there are not as many of each, or not two, or the
+/// wavelengths do not rise.
+std::optional<SpectrumPoints> spectrumOf(const std::vector<double>& wavelengths, const std::vector<double>& values);
 
-/// Linear between the points and zero beyond them. Channels are scaled so that equal energy is white: a spectrum that
-/// is c wherever one can see is grey c. For reflectances, and for emission as far as it is meant to be white.
-Rgb rgbOfSpectrum(const SpectrumPoints& points);
+/// The light in which a spectrum is looked at: its own, so that equal energy of 1 at all wavelengths has a luminance of
+/// 1 and the colour (1.205, 0.948, 0.909), or daylight (D65) that it reflects, so that a reflectance of c at all
+/// wavelengths is grey c.
+enum class Illuminant { equalEnergy, d65 };
 
-/// A black body's radiance in W/(m² sr nm), weighted by ȳ; its colour is the true one, white near 6500 K.
+/// Linear between the points and zero beyond them.
+Rgb rgbOfSpectrum(const SpectrumPoints& points, Illuminant illuminant);
+
+/// A black body's radiance in W/(m² sr nm), as that of points on its curve would be by Illuminant::equalEnergy.
 Rgb rgbOfBlackbody(double kelvin);
 
 }  // namespace lobe

@@ -1,7 +1,10 @@
 // Emitters: sampling, densities, photons.
 
 #include "chi2.h"
+#include "materials/bitmap.h"
+#include "materials/checkerboard.h"
 #include "render_test_tools.h"
+#include "runtime/render/delta_lights.h"
 #include "runtime/render/particle_tracer.h"
 
 using namespace lobe;
@@ -192,6 +195,13 @@ TEST_CASE("render: delta lights have the flux of their closed forms, whatever th
   CHECK(power(spot(kPi / 3, kPi / 3), 1) == Approx(2 * kPi));
   CHECK(power(spot(kPi / 2, 0), 1) == Approx(4 * kPi * (1 - 2 / kPi)));
   CHECK(power(spot(1e-3f, 1e-3f), 1) == Approx(2 * kPi * 1e-6));
+  // Of a texture of which half is black, in the cone's square; and a projector's picture: π × its area × its mean.
+  const TexturePtr board = makeCheckerboard(constantTexture(grey(1)), constantTexture(grey(0)));
+  const ProjectedTexture projected{board, axis.unitOrthogonal() * 0.5f, axis.unitOrthogonal().cross(axis) * 0.25f};
+  SpotLight textured = spot(kPi / 4, kPi / 4);
+  textured.texture = {{board, axis.unitOrthogonal() * 0.5f, axis.unitOrthogonal().cross(axis) * 0.5f}};
+  CHECK(power(textured, 1) == Approx(2 * kPi * (1 - std::sqrt(0.5))));
+  CHECK(power(ProjectorLight{{0, 0, 0}, axis, 3, projected}, 1) == Approx(kPi * 3 * 8 * 0.5));
   const double root3 = std::sqrt(3.0);  // the bounding box's corner
   for (const float size : {1e-9f, 1.0f, 1e15f})
     CHECK(power(DirectionalLight{axis, grey(2)}, size) == Approx(2 * kPi * std::pow(root3 * size, 2)).epsilon(1e-4));
@@ -219,6 +229,15 @@ TEST_CASE("render: what emitter sampling does alone is not learnt") {
 }
 
 namespace {
+
+// A picture of four pixels, one of them black, projected along −y.
+ProjectedTexture uneven(float perUnit) {
+  auto image = std::make_shared<Image>(2, 2, grey(0));
+  image->at(1, 0) = grey(1);
+  image->at(0, 1) = grey(3);
+  image->at(1, 1) = grey(0.5f);
+  return {makeBitmap(image, {.nearest = true}), Vec3::UnitX() * perUnit, Vec3::UnitZ() * perUnit};
+}
 
 // Photons that reach a disk, against the light that reaches it as seen from its points.
 void checkPhotons(const Scene& emitters) {
@@ -275,6 +294,12 @@ TEST_CASE("render: photons bring the light that is gathered") {
     const Vec3 axis = Vec3(-0.4f, -1, 0).normalized();
     scene.lights.push_back(SpotLight{{0.5f, 1, 0.2f}, axis, grey(2), 0.6f, 0.2f});
   }
+  SECTION("spot with a texture") {
+    scene.lights.push_back(SpotLight{{0, 1, 0}, -Vec3::UnitY(), grey(2), 0.6f, 0.2f, uneven(0.5f / std::tan(0.6f))});
+  }
+  SECTION("projector") {
+    scene.lights.push_back(ProjectorLight{{0, 1, 0}, -Vec3::UnitY(), 2, uneven(0.7f)});
+  }
   SECTION("directional") {
     scene.lights.push_back(DirectionalLight{Vec3(1, -2, 0).normalized(), grey(2)});
   }
@@ -285,4 +310,30 @@ TEST_CASE("render: photons bring the light that is gathered") {
     addEmitter(scene, Sphere{{0.5f, 1.5f, 0}, 0.5f}, 20);
   }
   checkPhotons(scene);
+}
+
+TEST_CASE("render: a plane shows the image of a projector, a cone that of a spot") {
+  // 2 in front of the light, looked at along its axis.
+  const auto irradiance = [](const DeltaLight& light, const Vec3& at) {
+    const auto sample = illuminate(light, at);
+    return sample ? sample->radiance.x() * sample->wi.y() : 0.0f;
+  };
+  // On the plane at distance 1, x and z from −1 to 1 are its edges.
+  const ProjectorLight projector{{0, 2, 0}, -Vec3::UnitY(), 2, uneven(0.5f)};
+  const auto shown = [&](float x, float z) { return irradiance(projector, {x, 0, z}) / kPi; };
+  CHECK(shown(-1.9f, -0.1f) == 0);
+  CHECK(shown(0.1f, -1.9f) == Approx(2 * 1 / 4.0));
+  CHECK(shown(1.9f, -0.1f) == Approx(2 * 1 / 4.0));
+  CHECK(shown(-0.1f, 0.1f) == Approx(2 * 3 / 4.0));
+  CHECK(shown(1.9f, 1.9f) == Approx(2 * 0.5 / 4.0));
+  CHECK(shown(2.1f, 1) == 0);
+  CHECK(irradiance(projector, {0.1f, 4, -0.1f}) == 0);  // behind it
+
+  SpotLight spot{{0, 2, 0}, -Vec3::UnitY(), grey(2), kPi / 4, kPi / 4};
+  const float plain = irradiance(spot, {0.4f, 0, -0.3f});
+  spot.texture = uneven(0.5f);
+  CHECK(irradiance(spot, {0.4f, 0, -0.3f}) == Approx(plain));
+  CHECK(irradiance(spot, {-0.4f, 0, 0.3f}) == Approx(3 * plain));
+  CHECK(irradiance(spot, {0.4f, 0, 0.3f}) == Approx(0.5 * plain));
+  CHECK(irradiance(spot, {-0.4f, 0, -0.3f}) == 0);
 }

@@ -46,7 +46,7 @@ TEST_CASE("scenes: unknown elements and types are told with what is known") {
   checkFault(faultOf("<shape type=\"torus\"/>"), "2:1",
              {"\"torus\"", "cube, cylinder, disk, instance, obj, ply, rectangle, serialized, shapegroup, sphere"});
   checkFault(faultOf("<emitter type=\"laser\"/>"), "2:1",
-             {"\"laser\"", "area, constant, directional, envmap, point, sky, spot, sun, sunsky"});
+             {"\"laser\"", "area, constant, directional, envmap, point, projector, sky, spot, sun, sunsky"});
   checkFault(faultOf("<emitter type=\"area\"/>"), "2:1", {"inside a shape"});
   checkFault(faultOf("<shape type=\"disk\"><emitter type=\"spot\"/></shape>"), "2:20", {"\"spot\"", "area"});
   checkFault(faultOf("<texture type=\"wood\"/>"), "2:1", {"\"wood\"", "bitmap, checkerboard, scale"});
@@ -120,7 +120,7 @@ TEST_CASE("scenes: emitters without meaning are refused") {
              "3:1", {"radiance", "negative", "-1"});
   checkFault(fault("spot", "<float name=\"cutoffAngle\" value=\"0\"/>"), "3:3", {"cutoff_angle", "180"});
   checkFault(fault("spot", "<float name=\"beamWidth\" value=\"25\"/>"), "3:3", {"beam_width", "20", "25"});
-  checkFault(fault("spot", "<texture type=\"checkerboard\"/>"), "3:3", {"texture", "spot"});
+  checkFault(fault("point", "<texture name=\"intensity\" type=\"checkerboard\"/>"), "3:3", {"intensity", "colour"});
   checkFault(fault("directional", "<vector name=\"direction\" x=\"0\"/>"), "3:3", {"direction", "zero"});
   checkFault(fault("point", "<point name=\"position\" x=\"1\"/><transform name=\"toWorld\"/>"), "3:33",
              {"position", "to_world"});
@@ -151,6 +151,10 @@ TEST_CASE("scenes: skies without meaning are refused") {
   }
   checkFault(fault("sunsky", "<float name=\"sunScale\" value=\"-1\"/>"), "3:3", {"sun_scale", "negative"});
   checkFault(fault("sun", "<float name=\"sunRadiusScale\" value=\"1e3\"/>"), "3:3", {"sun_radius_scale"});
+  checkFault(fault("sunsky", "<boolean name=\"complex_sun\" value=\"true\"/>"), "3:3", {"complex_sun", "disc"});
+  checkFault(fault("sky", "<boolean name=\"extend\" value=\"true\"/>"), "3:3", {"extend", "horizon"});
+  CHECK(fault("sunsky", "<boolean name=\"complex_sun\" value=\"false\"/><boolean name=\"extend\" value=\"false\"/>") ==
+        "");
 }
 
 TEST_CASE("scenes: cameras and crops without meaning are refused") {

@@ -22,7 +22,9 @@ const std::string kBody = R"(
 <shape type="instance"><ref id="group"/><transform name="to_world"><translate x="7"/></transform></shape>
 <shape type="rectangle"><emitter type="area"><rgb name="radiance" value="5"/></emitter></shape>
 <emitter type="point"><point name="position" x="0" y="9" z="0"/></emitter>
-<emitter type="spot"><float name="cutoff_angle" value="20"/></emitter>
+<emitter type="spot"><float name="cutoff_angle" value="20"/><texture type="checkerboard"><float name="color0"
+  value="0.75"/></texture></emitter>
+<emitter type="projector"><rgb name="irradiance" value="0.625"/><float name="fov" value="44"/></emitter>
 <emitter type="directional"><vector name="direction" x="0" y="0" z="-1"/></emitter>
 <emitter type="constant"><rgb name="radiance" value="0.5"/></emitter>
 )";

@@ -35,12 +35,38 @@ std::optional<LightSample> fromPosition(const Vec3& position, const Rgb& intensi
       toLight / distance, distance, irradiance, 1.0f, SurfacePoint{position, Vec3::Zero(), Vec2::Zero(), 0.0f}, true};
 }
 
+/// On the plane at distance 1, of the unit square of texture coordinates.
+double areaOf(const ProjectedTexture& projected) {
+  return 1.0 / (static_cast<double>(projected.u.norm()) * projected.v.norm());
+}
+
+/// The intensity that a spot light sends in a direction.
+Rgb intensityOf(const SpotLight& light, const Vec3& direction) {
+  const float share = falloff(light, direction);
+  if (!(share > 0.0f)) return Rgb::Zero();
+  const Rgb intensity = light.intensity * share;
+  if (!light.texture) return intensity;
+  return intensity * light.texture->texture->eval(light.texture->uvOf(light.direction, direction));
+}
+
+/// The intensity that a projector sends in a direction: over the plane, cosines make it an irradiance that does not
+/// depend on where.
+Rgb intensityOf(const ProjectorLight& light, const Vec3& direction) {
+  const float cosine = light.direction.dot(direction);
+  if (!(cosine > 0.0f)) return Rgb::Zero();
+  const Vec2 uv = light.image.uvOf(light.direction, direction);
+  if (!((uv.array() >= 0.0f).all() && (uv.array() <= 1.0f).all())) return Rgb::Zero();
+  return light.image.texture->eval(uv) * (kPi * light.scale / (cosine * cosine * cosine));
+}
+
 std::optional<LightSample> illuminateBy(const PointLight& light, const Vec3& point) {
   return fromPosition(light.position, light.intensity, point);
 }
 std::optional<LightSample> illuminateBy(const SpotLight& light, const Vec3& point) {
-  const float share = falloff(light, (point - light.position).normalized());
-  return share > 0.0f ? fromPosition(light.position, light.intensity * share, point) : std::nullopt;
+  return fromPosition(light.position, intensityOf(light, (point - light.position).normalized()), point);
+}
+std::optional<LightSample> illuminateBy(const ProjectorLight& light, const Vec3& point) {
+  return fromPosition(light.position, intensityOf(light, (point - light.position).normalized()), point);
 }
 std::optional<LightSample> illuminateBy(const DirectionalLight& light, const Vec3&) {
   return LightSample{-light.direction, kInfinity, light.irradiance, 1.0f, std::nullopt, true};
@@ -50,7 +76,11 @@ double fluxOf(const PointLight& light, const SceneSphere&) {
   return 4.0 * kPi * luminance(light.intensity);
 }
 double fluxOf(const SpotLight& light, const SceneSphere&) {
-  return solidAngle(light) * luminance(light.intensity);
+  const Rgb intensity = light.texture ? Rgb(light.intensity * light.texture->texture->mean()) : light.intensity;
+  return solidAngle(light) * luminance(intensity);
+}
+double fluxOf(const ProjectorLight& light, const SceneSphere&) {
+  return kPi * light.scale * areaOf(light.image) * luminance(light.image.texture->mean());
 }
 double fluxOf(const DirectionalLight& light, const SceneSphere& sphere) {
   const double radius = sphere.radius;
@@ -71,9 +101,17 @@ std::optional<EmittedPhoton> emitFrom(const SpotLight& light, const SceneSphere&
   const float azimuth = 2.0f * kPi * u.y();
   const Vec3 local(sine * std::cos(azimuth), sine * std::sin(azimuth), 1.0f - fromPole);
   const Vec3 direction = Frame::fromNormal(light.direction).toWorld(local);
-  const float share = falloff(light, direction);
-  if (!(share > 0.0f)) return std::nullopt;
-  return photon({light.position, direction}, light.intensity * (share * 2.0f * kPi * height), false);
+  const Rgb intensity = intensityOf(light, direction);
+  if (!(intensity.maxCoeff() > 0.0f)) return std::nullopt;
+  return photon({light.position, direction}, intensity * (2.0f * kPi * height), false);
+}
+std::optional<EmittedPhoton> emitFrom(const ProjectorLight& light, const SceneSphere&, const Vec2&, const Vec2& u) {
+  const Rgb irradiance = light.image.texture->eval(u) * (kPi * light.scale);
+  if (!(irradiance.maxCoeff() > 0.0f)) return std::nullopt;
+  const Vec3 onPlane = light.direction + light.image.u * ((u.x() - 0.5f) / light.image.u.squaredNorm()) +
+                       light.image.v * ((u.y() - 0.5f) / light.image.v.squaredNorm());
+  const Rgb power = irradiance * static_cast<float>(areaOf(light.image));
+  return photon({light.position, onPlane.normalized()}, power, false);
 }
 std::optional<EmittedPhoton> emitFrom(const DirectionalLight& light, const SceneSphere& sphere, const Vec2& u,
                                       const Vec2&) {
