@@ -1,14 +1,26 @@
 #include "scenes/mesh_file.h"
 
-#include <fstream>
+#include <cerrno>
 #include <stdexcept>
+#include <system_error>
 
 namespace lobe {
-std::string readBytes(const std::filesystem::path& path) {
-  if (!std::filesystem::exists(path)) throw std::runtime_error("no such file");
-  if (!std::filesystem::is_regular_file(path)) throw std::runtime_error("not a file");
+
+std::ifstream openFile(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  if (status.type() == std::filesystem::file_type::not_found) throw std::runtime_error("no such file");
+  if (error) throw std::runtime_error(fmt::format("cannot open: {}", error.message()));
+  if (std::filesystem::is_directory(status)) throw std::runtime_error("not a file but a folder");
+  if (!std::filesystem::is_regular_file(status)) throw std::runtime_error("not a file");
+  errno = 0;
   std::ifstream file(path, std::ios::binary);
-  if (!file) throw std::runtime_error("cannot open");
+  if (!file) throw std::runtime_error(fmt::format("cannot open: {}", std::generic_category().message(errno)));
+  return file;
+}
+
+std::string readBytes(const std::filesystem::path& path) {
+  std::ifstream file = openFile(path);
   std::string bytes(std::filesystem::file_size(path), '\0');
   if (!file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()))) throw std::runtime_error("cannot read");
   return bytes;

@@ -2,6 +2,7 @@
 // Internal to scenes/: what the readers of mesh files share.
 
 #include <filesystem>
+#include <fstream>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -11,6 +12,9 @@
 #include "scenes/scene.h"
 
 namespace lobe {
+
+/// The file, open for reading bytes. Throws std::runtime_error that does not name it but says why it cannot be had.
+std::ifstream openFile(const std::filesystem::path& path);
 
 /// All of a file. Throws std::runtime_error that does not name it.
 std::string readBytes(const std::filesystem::path& path);

@@ -2,48 +2,21 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <limits>
+#include <map>
+#include <optional>
+#include <set>
 #include <stdexcept>
 
 #include <fmt/format.h>
+
+#include "scenes/obj_lines.h"
 
 namespace lobe {
 namespace {
 
 constexpr int kNone = ObjData::kNone;
 constexpr int kTooLarge = std::numeric_limits<int>::max();
-
-bool isBlank(char c) {
-  return c == ' ' || c == '\t';
-}
-
-bool isLineEnd(char c) {
-  return c == '\n' || c == '\r';
-}
-
-/// Takes the next word off the line; empty at its end.
-std::string_view takeWord(std::string_view& line) {
-  std::size_t begin = 0;
-  while (begin < line.size() && isBlank(line[begin])) ++begin;
-  std::size_t end = begin;
-  while (end < line.size() && !isBlank(line[end])) ++end;
-  const std::string_view word = line.substr(begin, end - begin);
-  line.remove_prefix(end);
-  return word;
-}
-
-/// What is too small becomes zero, what is too large infinite.
-bool parseFloat(std::string_view word, float& value) {
-  if (word.starts_with('+')) word.remove_prefix(1);
-  double wide = 0;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), wide);
-  if (word.empty() || end != word.data() + word.size() || error == std::errc::invalid_argument) return false;
-  if (error == std::errc::result_out_of_range)
-    wide = word.find("e-") != std::string_view::npos || word.find("E-") != std::string_view::npos ? 0 : INFINITY;
-  value = static_cast<float>(wide);
-  return true;
-}
 
 /// One of a corner's numbers, up to the next slash, which is taken along; nothing is 0. What overflows is kTooLarge.
 bool takeIndex(std::string_view& word, int& index) {
@@ -65,46 +38,43 @@ int resolve(int index, std::size_t count) {
   return resolved >= 0 ? static_cast<int>(resolved) : kTooLarge;
 }
 
+/// Follows `g` and `usemtl` through a file. As in Mitsuba 0.6, they end a mesh when it has faces, and `o` does not.
+class ObjParts {
+ public:
+  /// Whether the line was one of the two. rest: of the line, after its key.
+  bool take(std::string_view key, std::string_view rest) {
+    if (key != "g" && key != "usemtl") return false;
+    if (hasFaces_) ++mesh_;
+    hasFaces_ = false;
+    if (key == "usemtl") material_ = trimmed(rest);
+    return true;
+  }
+  void addFace() { hasFaces_ = true; }
+  int mesh() const { return mesh_; }
+  const std::string& material() const { return material_; }
+
+ private:
+  int mesh_ = 0;
+  bool hasFaces_ = false;
+  std::string material_;
+};
+
 class ObjParser {
  public:
-  ObjParser(std::string_view text, const std::vector<std::string>& materials)
-      : text_(text), materials_(materials), part_(static_cast<int>(materials.size())) {}
+  explicit ObjParser(std::string_view text) : lines_(text) {}
 
   ObjData parse() {
-    if (text_.starts_with("\xef\xbb\xbf")) text_.remove_prefix(3);
-    for (std::size_t begin = 0; begin < text_.size();) {
-      line_ = begin;
-      readLine(takeLine(begin));
-    }
+    while (const std::optional<std::string_view> line = lines_.next()) readLine(*line);
     checkIndices();
+    data_.lastMaterial = material_;
     return std::move(data_);
   }
 
  private:
-  /// The line from begin on, without its end, which begin is moved past. Joined lines stay in joined_.
-  std::string_view takeLine(std::size_t& begin) {
-    std::string_view line = takePhysicalLine(begin);
-    if (!line.ends_with('\\')) return line;
-    joined_.clear();
-    while (line.ends_with('\\')) {
-      joined_.append(line.substr(0, line.size() - 1)) += ' ';
-      line = takePhysicalLine(begin);
-    }
-    return joined_ += line;
-  }
-
-  std::string_view takePhysicalLine(std::size_t& begin) const {
-    std::size_t end = begin;
-    while (end < text_.size() && !isLineEnd(text_[end])) ++end;
-    const std::string_view line = text_.substr(begin, end - begin);
-    begin = std::min(end + (text_.substr(end, 2) == "\r\n" ? 2 : 1), text_.size());
-    return line;
-  }
-
   void readLine(std::string_view line) {
     std::string_view rest = line;
     const std::string_view key = takeWord(rest);
-    if (key == "usemtl") return readMaterial(rest);
+    if (parts_.take(key, rest)) return setMaterial();
     rest = rest.substr(0, rest.find('#'));
     if (key == "v")
       readPosition(rest);
@@ -116,10 +86,10 @@ class ObjParser {
       readFace(rest);
   }
 
-  void readMaterial(std::string_view name) {
-    while (!name.empty() && isBlank(name.front())) name.remove_prefix(1);
-    while (!name.empty() && isBlank(name.back())) name.remove_suffix(1);
-    part_ = static_cast<int>(std::ranges::find(materials_, name) - materials_.begin());
+  void setMaterial() {
+    const auto [entry, isNew] = materialIds_.try_emplace(parts_.material(), static_cast<int>(data_.materials.size()));
+    if (isNew) data_.materials.push_back(parts_.material());
+    material_ = entry->second;
   }
 
   /// The first three numbers, of which so many are needed; what is not there is zero. All words must be numbers.
@@ -127,17 +97,17 @@ class ObjParser {
     Vec3 numbers = Vec3::Zero();
     int count = 0;
     for (std::string_view word = takeWord(rest); !word.empty(); word = takeWord(rest), ++count) {
-      float value = 0;
-      if (!parseFloat(word, value)) fail(line_, fmt::format("\"{}\" is not a number", word));
-      if (count < 3) numbers[count] = value;
+      const std::optional<float> value = parseFloat(word);
+      if (!value) fail(lines_.position(), fmt::format("\"{}\" is not a number", word));
+      if (count < 3) numbers[count] = *value;
     }
-    if (count < needed) fail(line_, fmt::format("{} numbers are needed", needed));
+    if (count < needed) fail(lines_.position(), fmt::format("{} numbers are needed", needed));
     return numbers;
   }
 
   void readPosition(std::string_view rest) {
     const Vec3 position = readNumbers(rest, 3);
-    if (!position.allFinite()) fail(line_, "not a finite number");
+    if (!position.allFinite()) fail(lines_.position(), "not a finite number");
     data_.positions.push_back(position);
   }
 
@@ -153,24 +123,25 @@ class ObjParser {
   }
 
   void readFace(std::string_view rest) {
+    const std::size_t begin = data_.corners.size();
     for (std::string_view word = takeWord(rest); !word.empty(); word = takeWord(rest)) {
       int position = 0, uv = 0, normal = 0;
       std::string_view left = word;
       if (!takeIndex(left, position) || !takeIndex(left, uv) || !takeIndex(left, normal) || !left.empty())
-        fail(line_, fmt::format("\"{}\" is not a corner such as 1, 1/2, 1//3 or 1/2/3", word));
+        fail(lines_.position(), fmt::format("\"{}\" is not a corner such as 1, 1/2, 1//3 or 1/2/3", word));
       data_.corners.push_back({resolve(position, data_.positions.size()), resolve(uv, data_.uvs.size()),
                                resolve(normal, data_.normals.size())});
     }
-    if (data_.corners.size() - data_.faceEnds.back() < 3) fail(line_, "a face needs three corners or more");
-    data_.faceEnds.push_back(data_.corners.size());
-    data_.faceParts.push_back(part_);
-    faceLines_.push_back(line_);
+    if (data_.corners.size() - begin < 3) fail(lines_.position(), "a face needs three corners or more");
+    parts_.addFace();
+    data_.faces.push_back({begin, data_.corners.size(), material_, parts_.mesh()});
+    faceLines_.push_back(lines_.position());
   }
 
   /// Only at the end, as a face may come before its vertices.
   void checkIndices() {
     for (std::size_t face = 0; face < faceLines_.size(); ++face)
-      for (std::size_t i = data_.faceEnds[face]; i < data_.faceEnds[face + 1]; ++i)
+      for (std::size_t i = data_.faces[face].begin; i < data_.faces[face].end; ++i)
         checkCorner(data_.corners[i], faceLines_[face]);
   }
 
@@ -185,33 +156,41 @@ class ObjParser {
     if (anyBadNormal_ && corner.normal != kNone && !data_.normals[corner.normal].allFinite()) corner.normal = kNone;
   }
 
-  [[noreturn]] void fail(std::size_t begin, std::string_view message) const {
-    std::size_t number = 1;
-    for (std::size_t i = 0; i < begin; ++i)
-      if (text_[i] == '\n' || (text_[i] == '\r' && text_.substr(i + 1, 1) != "\n")) ++number;
-    constexpr std::size_t kLongest = 60;
-    const std::string_view line = takePhysicalLine(begin);
-    std::string shown(line.substr(0, kLongest));
-    for (char& c : shown)
-      if (static_cast<unsigned char>(c) < ' ') c = ' ';
-    throw std::runtime_error(
-        fmt::format("line {}: {}: \"{}{}\"", number, message, shown, line.size() > kLongest ? "..." : ""));
+  [[noreturn]] void fail(std::size_t position, std::string_view message) const {
+    throw std::runtime_error(lines_.describe(position, message));
   }
 
-  std::string_view text_;
-  const std::vector<std::string>& materials_;
+  ObjLines lines_;
   ObjData data_;
+  ObjParts parts_;
+  std::map<std::string, int> materialIds_{{"", 0}};
+  int material_ = 0;                    // of the faces to come
   std::vector<std::size_t> faceLines_;  // where they begin
-  std::string joined_;
-  std::size_t line_ = 0;  // where the present one begins
-  int part_;              // of the faces to come
   bool anyBadNormal_ = false;
 };
 
 }  // namespace
 
-ObjData parseObj(std::string_view text, const std::vector<std::string>& materials) {
-  return ObjParser(text, materials).parse();
+ObjData parseObj(std::string_view text) {
+  return ObjParser(text).parse();
+}
+
+ObjMaterials findObjMaterials(std::string_view text, int onlyMesh) {
+  ObjMaterials found;
+  ObjParts parts;
+  ObjLines lines(text);
+  std::set<std::string> known;
+  while (const std::optional<std::string_view> line = lines.next()) {
+    std::string_view rest = *line;
+    const std::string_view key = takeWord(rest);
+    if (key == "mtllib") found.library = trimmed(rest);
+    if (parts.take(key, rest) || key != "f") continue;
+    parts.addFace();
+    const bool wanted = onlyMesh < 0 || parts.mesh() == onlyMesh;
+    if (wanted && known.insert(parts.material()).second) found.names.push_back(parts.material());
+  }
+  found.last = parts.material();
+  return found;
 }
 
 }  // namespace lobe

@@ -5,13 +5,18 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <iterator>
+#include <map>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string_view>
+#include <tuple>
 
 #include <fmt/format.h>
 
 #include "scenes/mesh_file.h"
+#include "scenes/polygon.h"
 #include "scenes/world_mesh.h"
 
 namespace lobe {
@@ -192,34 +197,47 @@ class Values {
   Format format_;
 };
 
-/// Reads the properties of one item: list values go to list when it is the wanted one, others to scalars.
-void readItem(const Element& element, int wantedList, Values& values, std::vector<double>& scalars,
-              std::vector<double>& list) {
-  for (std::size_t i = 0; i < element.properties.size(); ++i) {
-    const Property& property = element.properties[i];
-    if (!property.countType) {
-      scalars[i] = values.next(property.type);
-      continue;
-    }
-    const std::size_t count = values.nextCount(*property.countType);
-    const bool wanted = static_cast<int>(i) == wantedList;
-    if (wanted) list.clear();
-    for (std::size_t k = 0; k < count; ++k) {
-      const double value = values.next(property.type);
-      if (wanted) list.push_back(value);
-    }
+/// The lists of an element that are wanted, by the place of their property; −1 for one that is not there.
+constexpr std::size_t kWantedLists = 2;
+using WantedLists = std::array<int, kWantedLists>;
+constexpr WantedLists kNoLists = {-1, -1};
+
+/// What one item of an element holds: a place for each property that is no list, and the wanted lists.
+struct Item {
+  std::vector<double> scalars;
+  std::array<std::vector<double>, kWantedLists> lists;
+};
+
+void readList(const Property& property, Values& values, std::vector<double>* list) {
+  const std::size_t count = values.nextCount(*property.countType);
+  for (std::size_t k = 0; k < count; ++k) {
+    const double value = values.next(property.type);
+    if (list) list->push_back(value);
   }
 }
 
-/// Calls take(scalars, list) for each item of the element, scalars having one place for each property.
+void readItem(const Element& element, const WantedLists& wanted, Values& values, Item& item) {
+  for (std::vector<double>& list : item.lists) list.clear();
+  for (std::size_t i = 0; i < element.properties.size(); ++i) {
+    const Property& property = element.properties[i];
+    if (!property.countType) {
+      item.scalars[i] = values.next(property.type);
+      continue;
+    }
+    const auto which = static_cast<std::size_t>(std::ranges::find(wanted, static_cast<int>(i)) - wanted.begin());
+    readList(property, values, which < kWantedLists ? &item.lists[which] : nullptr);
+  }
+}
+
+/// Calls take(item) for each item of the element.
 template <class Take>
-void readElement(const Element& element, int wantedList, Values& values, const Take& take) {
+void readElement(const Element& element, const WantedLists& wanted, Values& values, const Take& take) {
   // Every property takes at least a byte, so a false count ends soon; without properties it would not.
   if (element.properties.empty()) return;
-  std::vector<double> scalars(element.properties.size()), list;
+  Item item{std::vector<double>(element.properties.size()), {}};
   for (std::uint64_t i = 0; i < element.count; ++i) {
-    readItem(element, wantedList, values, scalars, list);
-    take(scalars, list);
+    readItem(element, wanted, values, item);
+    take(item);
   }
 }
 
@@ -240,6 +258,14 @@ struct Places {
   }
 };
 
+/// Polygons as the file has them, which may give faces before vertices.
+struct PlyData {
+  TriangleMesh vertices;  ///< without triangles
+  std::vector<std::uint32_t> corners;
+  std::vector<std::size_t> faceEnds{0};  ///< face i has the corners from faceEnds[i] to before faceEnds[i + 1]
+  std::vector<Vec2> cornerUvs;           ///< one for each corner, or none at all
+};
+
 void readVertices(const Element& element, Values& values, TriangleMesh& mesh) {
   const auto place = [&element](std::initializer_list<std::string_view> names) {
     const int i = element.find(names);
@@ -251,48 +277,98 @@ void readVertices(const Element& element, Values& values, TriangleMesh& mesh) {
   if (!position.complete()) throw std::runtime_error("the vertices have no x, y and z");
   const bool hasNormals = normal.complete(), hasUvs = uv.complete();
   mesh.positions.reserve(std::min<std::uint64_t>(element.count, values.bytesLeft() / 3));
-  readElement(element, -1, values, [&](const std::vector<double>& scalars, const std::vector<double>&) {
-    mesh.positions.push_back(position.from(scalars));
-    if (hasNormals) mesh.normals.push_back(normal.from(scalars));
-    if (hasUvs) mesh.uvs.push_back(uv.from(scalars));
+  readElement(element, kNoLists, values, [&](const Item& item) {
+    mesh.positions.push_back(position.from(item.scalars));
+    if (hasNormals) mesh.normals.push_back(normal.from(item.scalars));
+    if (hasUvs) mesh.uvs.push_back(uv.from(item.scalars));
   });
 }
 
-void readFaces(const Element& element, Values& values, TriangleMesh& mesh) {
-  const int list = element.find({"vertex_indices", "vertex_index"});
-  if (list < 0 || !element.properties[list].countType) throw std::runtime_error("the faces have no vertex_indices");
-  readElement(element, list, values, [&mesh](const std::vector<double>&, const std::vector<double>& indices) {
-    for (const double i : indices)
-      if (!(i >= 0 && i == std::floor(i) && i < 4294967296.0))
-        throw std::runtime_error(fmt::format("a face refers to vertex {}, which cannot be", i));
-    const auto index = [&indices](std::size_t i) { return static_cast<std::uint32_t>(indices[i]); };
-    for (std::size_t i = 2; i < indices.size(); ++i) mesh.triangles.push_back({index(0), index(i - 1), index(i)});
+std::uint32_t vertexIndex(double value) {
+  if (!(value >= 0 && value == std::floor(value) && value < 4294967296.0))
+    throw std::runtime_error(fmt::format("a face refers to vertex {}, which cannot be", value));
+  return static_cast<std::uint32_t>(value);
+}
+
+/// A face without any gets the origin for all of its corners.
+void addCornerUvs(const std::vector<double>& numbers, std::size_t corners, std::vector<Vec2>& uvs) {
+  if (!numbers.empty() && numbers.size() != 2 * corners)
+    throw std::runtime_error(
+        fmt::format("a face of {} corners has {} texture coordinates, not two for each", corners, numbers.size()));
+  for (const double number : numbers)
+    if (!std::isfinite(static_cast<float>(number)))
+      throw std::runtime_error("a texture coordinate is not a finite number");
+  for (std::size_t i = 0; i < corners; ++i)
+    uvs.push_back(numbers.empty() ? Vec2(0, 0) : Vec2(Eigen::Vector2d(&numbers[2 * i]).cast<float>()));
+}
+
+void readFaces(const Element& element, Values& values, PlyData& data) {
+  const auto place = [&element](std::initializer_list<std::string_view> names) {
+    const int i = element.find(names);
+    return i >= 0 && element.properties[i].countType ? i : -1;
+  };
+  const int list = place({"vertex_indices", "vertex_index"}), uvs = place({"texcoord", "texture_uv"});
+  if (list < 0) throw std::runtime_error("the faces have no vertex_indices");
+  readElement(element, {list, uvs}, values, [&](const Item& item) {
+    const std::vector<double>& indices = item.lists[0];
+    std::ranges::transform(indices, std::back_inserter(data.corners), vertexIndex);
+    data.faceEnds.push_back(data.corners.size());
+    if (uvs >= 0) addCornerUvs(item.lists[1], indices.size(), data.cornerUvs);
   });
 }
 
-TriangleMesh parsePly(std::string_view file) {
+PlyData parsePly(std::string_view file) {
   const Header header = parseHeader(file);
   Values values(file.substr(header.size), header.format);
-  TriangleMesh mesh;
+  PlyData data;
   for (const Element& element : header.elements) {
     if (element.name == "vertex")
-      readVertices(element, values, mesh);
+      readVertices(element, values, data.vertices);
     else if (element.name == "face")
-      readFaces(element, values, mesh);
+      readFaces(element, values, data);
     else
-      readElement(element, -1, values, [](const auto&, const auto&) {});
+      readElement(element, kNoLists, values, [](const Item&) {});
   }
-  for (const auto& triangle : mesh.triangles)
-    for (const std::uint32_t i : triangle)
-      if (i >= mesh.positions.size())
-        throw std::runtime_error(fmt::format("a face refers to vertex {}, but there are {}", i, mesh.positions.size()));
+  const std::size_t count = data.vertices.positions.size();
+  for (const std::uint32_t i : data.corners)
+    if (i >= count) throw std::runtime_error(fmt::format("a face refers to vertex {}, but there are {}", i, count));
+  return data;
+}
+
+/// Texture coordinates of corners become those of vertices: one vertex for each pair of a file's vertex and
+/// coordinates.
+void splitByUv(PlyData& data) {
+  TriangleMesh split;
+  std::map<std::tuple<std::uint32_t, float, float>, std::uint32_t> known;
+  for (std::size_t i = 0; i < data.corners.size(); ++i) {
+    const std::uint32_t from = data.corners[i];
+    const Vec2& uv = data.cornerUvs[i];
+    const auto [entry, isNew] =
+        known.try_emplace({from, uv.x(), uv.y()}, static_cast<std::uint32_t>(split.positions.size()));
+    data.corners[i] = entry->second;
+    if (!isNew) continue;
+    split.positions.push_back(data.vertices.positions[from]);
+    if (!data.vertices.normals.empty()) split.normals.push_back(data.vertices.normals[from]);
+    split.uvs.push_back(uv);
+  }
+  data.vertices = std::move(split);
+}
+
+TriangleMesh buildMesh(PlyData data) {
+  if (!data.cornerUvs.empty()) splitByUv(data);
+  TriangleMesh mesh = std::move(data.vertices);
+  for (std::size_t face = 0; face + 1 < data.faceEnds.size(); ++face) {
+    const std::span<const std::uint32_t> corners(data.corners.data() + data.faceEnds[face],
+                                                 data.faceEnds[face + 1] - data.faceEnds[face]);
+    if (corners.size() >= 3) appendPolygon(mesh, corners);
+  }
   return mesh;
 }
 
 }  // namespace
 
 TriangleMesh readPly(const std::filesystem::path& path, const MeshOptions& options) {
-  return naming(path, [&] { return toWorldMesh(parsePly(readBytes(path)), options); });
+  return naming(path, [&] { return toWorldMesh(buildMesh(parsePly(readBytes(path))), options); });
 }
 
 }  // namespace lobe

@@ -3,9 +3,11 @@
 #include <cmath>
 #include <stdexcept>
 
+#include <fmt/format.h>
 #include <Eigen/Geometry>
 
 #include "materials/frame.h"
+#include "scenes/scene_scale.h"
 #include "scenes/world_mesh.h"
 
 namespace lobe {
@@ -26,8 +28,9 @@ void addSquare(TriangleMesh& mesh, const Vec3& centre, const Vec3& s, const Vec3
   mesh.triangles.push_back({first, first + 2, first + 3});
 }
 
-bool isCircle(const Vec3& u, const Vec3& v) {
-  const float square = u.squaredNorm();
+// In double precision, as squares of lengths may leave the range of floats.
+bool isCircle(const Eigen::Vector3d& u, const Eigen::Vector3d& v) {
+  const double square = u.squaredNorm();
   return std::abs(v.squaredNorm() - square) <= 2 * kTolerance * square && std::abs(u.dot(v)) <= kTolerance * square;
 }
 
@@ -39,6 +42,12 @@ bool mirrors(const Eigen::Matrix3f& linear) {
 TriangleMesh finish(TriangleMesh mesh, MeshOptions options) {
   options.faceNormals = false;
   return toWorldMesh(std::move(mesh), options);
+}
+
+/// reach: how far the shape extends along each axis.
+void requireInRange(const Vec3& centre, const Vec3& reach) {
+  if (!isInRange(centre.cwiseAbs() + reach.cwiseAbs()))
+    throw std::runtime_error(fmt::format("coordinates over {:g} in the world are not supported", kLargestCoordinate));
 }
 
 }  // namespace
@@ -61,37 +70,42 @@ TriangleMesh makeCube(const MeshOptions& options) {
 
 Disk makeDisk(const MeshOptions& options) {
   const Eigen::Matrix3f linear = checkedLinear(options.toWorld);
-  const Vec3 u = linear.col(0), v = linear.col(1);
-  if (!isCircle(u, v)) throw std::runtime_error("a disk's transform must keep it round");
-  return {options.toWorld.topRightCorner<3, 1>(), u, v, mirrors(linear) != options.flipNormals};
+  const Vec3 centre = options.toWorld.topRightCorner<3, 1>(), u = linear.col(0), v = linear.col(1);
+  requireInRange(centre, u.cwiseAbs() + v.cwiseAbs());
+  return {centre, u, v, mirrors(linear) != options.flipNormals};
 }
 
 Sphere makeSphere(const Vec3& centre, float radius, const MeshOptions& options) {
   if (!(radius > 0) || !std::isfinite(radius) || !centre.allFinite())
     throw std::runtime_error("a sphere needs a finite centre and a radius above zero");
   const Eigen::Matrix3f linear = checkedLinear(options.toWorld);
-  const Eigen::Matrix3f squares = linear.transpose() * linear;
-  const float square = squares.trace() / 3;
-  if (!((squares - square * Eigen::Matrix3f::Identity()).cwiseAbs().maxCoeff() <= 2 * kTolerance * square))
-    throw std::runtime_error("a sphere's transform must scale all directions alike");
-  const float scale = std::sqrt(square);
-  return {linear * centre + options.toWorld.topRightCorner<3, 1>(), radius * scale, options.flipNormals,
-          linear / scale};
+  const Eigen::Matrix3d squares = linear.cast<double>().transpose() * linear.cast<double>();
+  const double square = squares.trace() / 3;
+  if (!((squares - square * Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= 2 * kTolerance * square))
+    throw std::runtime_error("a sphere's transform must scale all directions alike: ellipsoids are not supported");
+  const auto scale = static_cast<float>(std::sqrt(square));
+  const Vec3 placed = linear * centre + options.toWorld.topRightCorner<3, 1>();
+  requireInRange(placed, Vec3::Constant(radius * scale));
+  return {placed, radius * scale, options.flipNormals, linear / scale};
 }
 
 Cylinder makeCylinder(const Vec3& start, const Vec3& end, float radius, const MeshOptions& options) {
   const Vec3 along = end - start;
   if (!(radius > 0) || !std::isfinite(radius) || !start.allFinite() || !end.allFinite() || along.isZero(0))
     throw std::runtime_error("a cylinder needs two different finite ends and a radius above zero");
-  const Frame frame = Frame::fromNormal(along.normalized());
+  const Frame frame = Frame::fromNormal(along.cast<double>().normalized().cast<float>());
   const Eigen::Matrix3f linear = checkedLinear(options.toWorld);
   const Vec3 u = linear * (radius * frame.s), v = linear * (radius * frame.t), axis = linear * along;
   const auto upright = [&](const Vec3& edge) {
-    return std::abs(edge.dot(axis)) <= kTolerance * edge.norm() * axis.norm();
+    const Eigen::Vector3d e = edge.cast<double>(), a = axis.cast<double>();
+    return std::abs(e.dot(a)) <= kTolerance * e.norm() * a.norm();
   };
-  if (!isCircle(u, v) || !upright(u) || !upright(v))
-    throw std::runtime_error("a cylinder's transform must keep it round and upright");
-  return {linear * start + options.toWorld.topRightCorner<3, 1>(), u, v, axis, options.flipNormals};
+  if (!isCircle(u.cast<double>(), v.cast<double>()) || !upright(u) || !upright(v))
+    throw std::runtime_error(
+        "a cylinder's transform must keep it round and upright: elliptic and oblique ones are not supported");
+  const Vec3 base = linear * start + options.toWorld.topRightCorner<3, 1>();
+  requireInRange(base, u.cwiseAbs() + v.cwiseAbs() + axis.cwiseAbs());
+  return {base, u, v, axis, options.flipNormals};
 }
 
 }  // namespace lobe

@@ -13,7 +13,7 @@ TriangleMesh makeRectangle(const MeshOptions& options);
 /// [-1,1]³, front outwards; uv covers [0,1]² on every face.
 TriangleMesh makeCube(const MeshOptions& options);
 
-/// The unit disk in the plane z = 0, front towards +z. std::runtime_error: the transform makes an ellipse of it.
+/// The unit disk in the plane z = 0, front towards +z; any transform makes an ellipse of it.
 Disk makeDisk(const MeshOptions& options);
 
 /// radius > 0. std::runtime_error: the transform makes an ellipsoid of it.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <stdexcept>
 
 #include <fmt/format.h>
 
@@ -9,6 +10,7 @@
 #include "scenes/reader_parameters.h"
 #include "scenes/reader_sensor.h"
 #include "scenes/reader_shapes.h"
+#include "scenes/scene_scale.h"
 #include "scenes/values.h"
 
 namespace lobe {
@@ -35,7 +37,9 @@ class SceneReader {
     if (!sensor_ && context_.options.geometry)
       context_.unsupported(context_.file.scene(), "no sensor", "the scene has no <sensor>", "");
     emitters_.finish();
-    if (context_.options.geometry) shapes_.readMeshes();
+    if (!context_.options.geometry) return;
+    shapes_.readMeshes();
+    bringIntoRange();
   }
 
  private:
@@ -56,6 +60,17 @@ class SceneReader {
       readIntegrator(context_, node);
     else if (std::ranges::find(kElsewhere, tag) == kElsewhere.end())
       reject(node);
+  }
+
+  void bringIntoRange() {
+    try {
+      lobe::bringIntoRange(context_.scene);
+    } catch (const std::runtime_error& error) {
+      context_.unsupported(context_.file.scene(), "scale", error.what(), "");
+    }
+    if (context_.scene.scale != 1.0f)
+      context_.note(
+          fmt::format("all lengths are multiplied by {:g}: the scene is far from ordinary size", context_.scene.scale));
   }
 
   void readFirstSensor(pugi::xml_node node) {

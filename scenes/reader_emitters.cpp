@@ -40,16 +40,19 @@ std::optional<Environment> makeFromImage(ReadContext& context, TextureReader& te
 }
 
 Vec3 readPosition(const Parameters& parameters) {
-  if (!parameters.has("position")) return toWorld(parameters).topRightCorner<3, 1>();
+  if (!parameters.has("position")) return placeInWorld(parameters).topRightCorner<3, 1>();
   if (parameters.has("to_world")) throw ParameterError("to_world", "give either position or to_world");
-  return parameters.colour("position", Rgb::Zero()).matrix();
+  const Vec3 position = parameters.colour("position", Rgb::Zero()).matrix();
+  requireInRange(position, "position");
+  return position;
 }
 
 /// Where +z of the emitter's frame points to.
 Vec3 readAxis(const Parameters& parameters, const Vec3& axis) {
-  if (!(axis.norm() > 0.0f))
+  const Eigen::Vector3d wide = axis.cast<double>();  // its square may be no float
+  if (!(wide.norm() > 0.0))
     throw ParameterError(parameters.has("direction") ? "direction" : "to_world", "the light's direction is zero");
-  return axis.normalized();
+  return wide.normalized().cast<float>();
 }
 
 PointLight makePoint(const Parameters& parameters) {
@@ -79,7 +82,7 @@ std::optional<ProjectedTexture> makeSpotTexture(const Parameters& parameters, co
 }
 
 SpotLight makeSpot(const Parameters& parameters) {
-  const Eigen::Matrix4f frame = toWorld(parameters);
+  const Eigen::Matrix4f frame = placeInWorld(parameters);
   const double cutoff = parameters.number("cutoff_angle", 20.0);
   if (!(cutoff > 0.0 && cutoff <= 180.0))
     throw ParameterError("cutoff_angle",

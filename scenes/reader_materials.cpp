@@ -43,11 +43,16 @@ void MaterialReader::check(pugi::xml_node node) {
   if (!namesMeasurement(node) && !node.find_node(namesMeasurement)) read(node);
 }
 
+MaterialReader::Made MaterialReader::makeOf(const std::string& type, const Parameters& parameters,
+                                            const std::vector<std::uint64_t>& children) {
+  const BsdfPtr bsdf = makeBsdf(type, parameters);
+  return {bsdf, fingerprintOf(type, parameters, children, *bsdf)};
+}
+
 MaterialReader::Made MaterialReader::makeDiffuseOf(float reflectance) {
   Parameters parameters;
   parameters.set("reflectance", static_cast<double>(reflectance));
-  const BsdfPtr bsdf = makeBsdf("diffuse", parameters);
-  return {bsdf, fingerprintOf("diffuse", parameters, {}, *bsdf)};
+  return makeOf("diffuse", parameters);
 }
 
 const MaterialReader::Made& MaterialReader::done(pugi::xml_node node) {

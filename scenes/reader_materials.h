@@ -23,17 +23,24 @@ class MaterialReader {
   /// The same for shapes without a BSDF: diffuse 0.5 as in Mitsuba, or black as in Mitsuba 3 where they emit.
   int useDefault(bool emits);
 
- private:
+  /// A BSDF, and of what it was made.
   struct Made {
     BsdfPtr bsdf;  ///< null while being read
     std::uint64_t fingerprint = 0;
   };
+  /// Makes one that stands in no element, of parameters with their children, of which the fingerprints are given.
+  /// Throws ParameterError.
+  static Made makeOf(const std::string& type, const Parameters& parameters,
+                     const std::vector<std::uint64_t>& children = {});
+  /// The index in Scene::materials where it is put; an empty name becomes one of ours.
+  int add(std::string name, const Made& made);
+
+ private:
   static Made makeDiffuseOf(float reflectance);
   const Made& done(pugi::xml_node node);
   Made make(pugi::xml_node node);
   /// Makes the file's name one from the scene's folder. Returns whether the file is there, if its lack is tolerated.
   bool resolveFile(pugi::xml_node node, Parameters& parameters);
-  int add(std::string name, const Made& made);
 
   ReadContext& context_;
   TextureReader& textures_;

@@ -11,6 +11,7 @@
 
 #include "scenes/reader_colours.h"
 #include "scenes/reader_values.h"
+#include "scenes/scene_scale.h"
 #include "scenes/values.h"
 
 namespace lobe {
@@ -32,7 +33,6 @@ constexpr std::pair<std::string_view, std::string_view> kWithoutEffect[] = {
      "gamma, has_alpha, high_quality_edges, key, pixel_format, sample_border, tonemap_method, variable"},
     {"integrator", "*"},
     {"sensor", "shutter_close, shutter_open"},
-    {"shape \"obj\"", "load_materials, shape_index"},
     {"shape \"ply\"", "srgb"},
 };
 
@@ -166,6 +166,18 @@ Eigen::Matrix3f rotationOf(const Parameters& parameters, const char* name) {
 
 Eigen::Matrix4f toWorld(const Parameters& parameters) {
   return parameters.transform("to_world").cast<float>();
+}
+
+void requireInRange(const Vec3& position, const char* name) {
+  if (!isInRange(position))
+    throw ParameterError(name, fmt::format("a place at {:g}, {:g}, {:g}: coordinates over {:g} are not supported",
+                                           position.x(), position.y(), position.z(), kLargestCoordinate));
+}
+
+Eigen::Matrix4f placeInWorld(const Parameters& parameters) {
+  const Eigen::Matrix4f placed = toWorld(parameters);
+  requireInRange(placed.topRightCorner<3, 1>(), "to_world");
+  return placed;
 }
 
 }  // namespace lobe

@@ -80,4 +80,10 @@ Eigen::Matrix3f rotationOf(const Parameters& parameters, const char* name);
 /// As floats, for the world of shapes and cameras.
 Eigen::Matrix4f toWorld(const Parameters& parameters);
 
+/// The same for what stands at its origin. ParameterError when that is too far away (see scene_scale.h).
+Eigen::Matrix4f placeInWorld(const Parameters& parameters);
+
+/// ParameterError of that name when the position is too far away.
+void requireInRange(const Vec3& position, const char* name);
+
 }  // namespace lobe

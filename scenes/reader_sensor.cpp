@@ -174,7 +174,7 @@ constexpr std::array<std::string_view, 3> kCameras = {"perspective", "thinlens",
 Camera readCamera(ReadContext& context, pugi::xml_node node, const Parameters& parameters, Camera::Kind kind) {
   Camera camera = context.scene.camera;
   camera.kind = kind;
-  camera.toWorld = toWorld(parameters);
+  camera.toWorld = placeInWorld(parameters);
   if (kind != Camera::Kind::orthographic) readPerspective(parameters, camera);
   if (kind == Camera::Kind::thinlens) readLens(parameters, camera);
   readClipPlanes(parameters, camera);

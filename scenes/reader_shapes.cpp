@@ -11,6 +11,7 @@
 #include "scenes/emission.h"
 #include "scenes/primitives.h"
 #include "scenes/reader_parameters.h"
+#include "scenes/scene_scale.h"
 #include "scenes/values.h"
 
 namespace lobe {
@@ -24,12 +25,24 @@ bool isMesh(std::string_view type) {
   return type == "obj" || type == "ply" || type == "serialized";
 }
 
+std::optional<float> readSmoothAngle(const Parameters& parameters) {
+  if (!parameters.has("max_smooth_angle")) return std::nullopt;
+  const double degrees = parameters.number("max_smooth_angle", 0);
+  if (!(degrees >= 0 && degrees <= 180))
+    throw ParameterError("max_smooth_angle",
+                         fmt::format("max_smooth_angle must be between 0 and 180 degrees, not {}", degrees));
+  return static_cast<float>(degrees);
+}
+
 MeshOptions readOptions(const std::string& type, const Parameters& parameters) {
   MeshOptions options;
   options.toWorld = toWorld(parameters);
   options.flipNormals = parameters.flag("flip_normals", false);
   if (!isMesh(type)) return options;
   options.faceNormals = parameters.flag("face_normals", false);
+  options.maxSmoothAngle = readSmoothAngle(parameters);
+  if (options.faceNormals && options.maxSmoothAngle)
+    throw ParameterError("max_smooth_angle", "give either face_normals or max_smooth_angle");
   // Mitsuba flips what an OBJ holds unless told otherwise, and the reader of OBJ files does so by itself.
   const bool usual = type == "obj";
   options.flipTexCoords = parameters.flag("flip_tex_coords", usual) != usual;
@@ -67,11 +80,16 @@ Geometry makePrimitive(const std::string& type, const Parameters& parameters, co
   }
 }
 
-int readIndex(const Parameters& parameters) {
-  const double index = parameters.number("shape_index", 0);
-  if (!(index >= 0 && index <= 1e9) || index != std::floor(index))
+int readIndex(const Parameters& parameters, int fallback) {
+  const double index = parameters.number("shape_index", fallback);
+  if (!(index >= std::min(fallback, 0) && index <= 1e9) || index != std::floor(index))
     throw ParameterError("shape_index", fmt::format("shape_index must be a whole number from 0, not {}", index));
   return static_cast<int>(index);
+}
+
+ObjGrouping readGrouping(const Parameters& parameters, bool isOfToday) {
+  if (parameters.flag("collapse", false)) return ObjGrouping::collapsed;
+  return isOfToday ? ObjGrouping::joined : ObjGrouping::separate;
 }
 
 Instance makeInstance(int group, const Parameters& parameters) {
@@ -118,7 +136,7 @@ void ShapeReader::addShape(int group, pugi::xml_node node, const std::string& ty
     Mesh mesh = makeFrom(context_, node, parameters,
                          [&](const Parameters& p) { return makeMesh(type, p, readOptions(type, p)); });
     const std::string file = parameters.text("filename", "");
-    addMesh(group, std::move(mesh), id.empty() ? file : id, parts);
+    addMesh(group, node, std::move(mesh), id.empty() ? file : id, parts);
     return;
   }
   Geometry geometry = makeFrom(context_, node, parameters,
@@ -144,7 +162,8 @@ void ShapeReader::addInstance(pugi::xml_node node) {
   Shape shape = makeFrom(context_, node, parameters, [&](const Parameters& p) {
     return Shape{id.empty() ? "instance" : id, makeInstance(*group, p), -1, std::nullopt};
   });
-  shapesOf(kTop).push_back(std::move(shape));
+  instances_.emplace_back(context_.scene.shapes.size(), SceneFile::location(node));
+  context_.scene.shapes.push_back(std::move(shape));
 }
 
 int ShapeReader::groupOf(pugi::xml_node node) {
@@ -213,25 +232,32 @@ ShapeReader::Mesh ShapeReader::makeMesh(const std::string& type, const Parameter
                                         const MeshOptions& options) {
   const std::filesystem::path path =
       context_.file.resolve(requiredText(parameters, "filename"), parameters.location("filename"));
-  const int index = type == "serialized" ? readIndex(parameters) : 0;
-  // They concern normals that the file lacks and vertices it repeats: ours are smooth, and what is equal is merged.
-  parameters.number("max_smooth_angle", 0);
-  parameters.flag("collapse", false);
-  for (const char* name : {"max_smooth_angle", "collapse"})
-    if (parameters.has(name)) context_.findings.noteWithoutEffect(fmt::format("shape \"{}\"", type), name);
-  return {{}, parameters.location("filename"), {type, path, index, {}}, options, ""};
+  MeshSource source{type, path, 0, {}};
+  bool loadMaterials = false;
+  if (type == "serialized") source.index = readIndex(parameters, 0);
+  if (type == "obj") {
+    const bool isOfToday = context_.file.isOfToday();
+    source.obj = {{}, readIndex(parameters, -1), readGrouping(parameters, isOfToday)};
+    loadMaterials = parameters.flag("load_materials", !isOfToday);
+  }
+  return {{}, parameters.location("filename"), std::move(source), options, loadMaterials, ""};
 }
 
-void ShapeReader::addMesh(int group, Mesh mesh, const std::string& name, const Parts& parts) {
+void ShapeReader::addMesh(int group, pugi::xml_node node, Mesh mesh, const std::string& name, const Parts& parts) {
   std::vector<Shape>& shapes = shapesOf(group);
   const auto add = [&](const std::string& part, int material) {
     mesh.shapes.push_back({group, shapes.size()});
     shapes.push_back({part, TriangleMesh(), material, parts.emitter});
   };
   for (const auto& [material, bsdf] : parts.named) {
-    mesh.source.materials.push_back(material);
+    mesh.source.obj.materials.push_back(material);
     add(name + ":" + material, materials_.use(bsdf));
   }
+  if (mesh.loadMaterials && !parts.bsdf)
+    for (const auto& [material, index] : objMaterials_.read(node, mesh.location, mesh.source)) {
+      mesh.source.obj.materials.push_back(material);
+      add(name + ":" + material, index);
+    }
   add(name, materialOf(parts));
   meshes_.push_back(std::move(mesh));
 }
@@ -242,6 +268,7 @@ void ShapeReader::readMeshes() {
     if (context_.options.onProgress) context_.options.onProgress(1.0 / static_cast<double>(meshes_.size()));
   });
   for (const Mesh& mesh : meshes_) reportFault(mesh);
+  checkInstances();
   // From the back, as places are indices.
   for (auto mesh = meshes_.rbegin(); mesh != meshes_.rend(); ++mesh) dropEmpty(*mesh);
 }
@@ -262,14 +289,27 @@ void ShapeReader::reportFault(const Mesh& mesh) {
   context_.unsupported(mesh.location, message, message, "the shape is left out");
 }
 
+void ShapeReader::checkInstances() {
+  for (const auto& [index, location] : instances_) {
+    const auto& instance = std::get<Instance>(context_.scene.shapes[index].geometry);
+    const ShapeGroup& group = context_.scene.groups[static_cast<std::size_t>(instance.group)];
+    const Eigen::AlignedBox3d box = boundsOf(group, instance.toWorld);
+    if (box.isEmpty() || (isInRange(box.min().cast<float>()) && isInRange(box.max().cast<float>()))) continue;
+    context_.unsupported(
+        location, fmt::format("instance at {}", location),
+        fmt::format("shape \"instance\": coordinates over {:g} in the world are not supported", kLargestCoordinate),
+        "");
+  }
+}
+
 void ShapeReader::dropEmpty(const Mesh& mesh) {
   for (std::size_t i = mesh.shapes.size(); i-- > 0;) {
     std::vector<Shape>& shapes = shapesOf(mesh.shapes[i].group);
     const auto shape = shapes.begin() + static_cast<std::ptrdiff_t>(mesh.shapes[i].index);
     if (!std::get<TriangleMesh>(shape->geometry).triangles.empty()) continue;
-    if (mesh.fault.empty() && i < mesh.source.materials.size())
+    if (mesh.fault.empty() && i < mesh.source.obj.materials.size())
       context_.note(fmt::format("{}: no face is of material \"{}\"", mesh.source.path.filename().string(),
-                                mesh.source.materials[i]));
+                                mesh.source.obj.materials[i]));
     shapes.erase(shape);
   }
 }

@@ -6,13 +6,14 @@
 #include "scenes/mesh_options.h"
 #include "scenes/mesh_source.h"
 #include "scenes/reader_materials.h"
+#include "scenes/reader_obj_materials.h"
 
 namespace lobe {
 
 class ShapeReader {
  public:
   ShapeReader(ReadContext& context, TextureReader& textures, MaterialReader& materials)
-      : context_(context), textures_(textures), materials_(materials) {}
+      : context_(context), textures_(textures), materials_(materials), objMaterials_(context, textures, materials) {}
 
   /// Adds the shape to the scene; its mesh is left for readMeshes. Throws SceneError.
   void add(pugi::xml_node node);
@@ -35,6 +36,7 @@ class ShapeReader {
     std::ptrdiff_t location;
     MeshSource source;
     MeshOptions options;
+    bool loadMaterials;  ///< of an OBJ, from the library that it names
     std::string fault;
   };
 
@@ -47,20 +49,24 @@ class ShapeReader {
   void takeBsdf(pugi::xml_node child, const std::string& name, const std::string& type, Parts& parts);
   void takeEmitter(pugi::xml_node node, Parts& parts);
   Mesh makeMesh(const std::string& type, const Parameters& parameters, const MeshOptions& options);
-  void addMesh(int group, Mesh mesh, const std::string& name, const Parts& parts);
+  void addMesh(int group, pugi::xml_node node, Mesh mesh, const std::string& name, const Parts& parts);
   int materialOf(const Parts& parts);
   std::vector<Shape>& shapesOf(int group) {
     return group < 0 ? context_.scene.shapes : context_.scene.groups[static_cast<std::size_t>(group)].shapes;
   }
   void read(Mesh& mesh);
   void reportFault(const Mesh& mesh);
+  /// A fault where one shows its group too far away.
+  void checkInstances();
   void dropEmpty(const Mesh& mesh);
 
   ReadContext& context_;
   TextureReader& textures_;
   MaterialReader& materials_;
+  ObjMaterialReader objMaterials_;
   std::vector<Mesh> meshes_;
-  std::map<std::ptrdiff_t, int> groups_;  // by place in the file
+  std::vector<std::pair<std::size_t, std::ptrdiff_t>> instances_;  // index into the scene's shapes, place in the file
+  std::map<std::ptrdiff_t, int> groups_;                           // by place in the file
 };
 
 }  // namespace lobe

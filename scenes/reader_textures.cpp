@@ -115,6 +115,14 @@ bool TextureReader::take(pugi::xml_node child, const std::string& name, Paramete
   return true;
 }
 
+TexturePtr TextureReader::readFile(pugi::xml_node node, std::ptrdiff_t location, const std::filesystem::path& path,
+                                   Encoded encoded) {
+  Parameters parameters;
+  parameters.set("filename", path.string(), location);
+  parameters.set("raw", encoded != Encoded::asGiven);
+  return makeFromBitmap(node, parameters, encoded);
+}
+
 TexturePtr TextureReader::make(pugi::xml_node node, Encoded encoded) {
   const std::string type = typeOf(context_, node);
   if (type != "bitmap" && type != "checkerboard" && type != "scale" && !isSpectrum(type)) {

@@ -18,6 +18,9 @@ class TextureReader {
 
   /// bitmap, checkerboard, scale or a spectrum; each element is read once for each encoding. Throws SceneError.
   TexturePtr read(pugi::xml_node node, Encoded encoded = Encoded::asGiven);
+  /// The image in the file, repeated over all texture coordinates, for what names it other than by a texture element.
+  /// The node is that of which messages speak, the location where it names the file.
+  TexturePtr readFile(pugi::xml_node node, std::ptrdiff_t location, const std::filesystem::path& path, Encoded encoded);
   ImageStore& images() { return images_; }
 
   /// Sets the parameter if the child is a texture, as a ChildHandler does.

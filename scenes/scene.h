@@ -1,5 +1,6 @@
 #pragma once
-// A scene as plain data: what a reader produces and renderer and fitter consume. World units are the file's.
+// A scene as plain data: what a reader produces and renderer and fitter consume. World units are the file's, unless it
+// is far from ordinary size (see Scene::scale).
 
 #include <array>
 #include <cstdint>
@@ -36,8 +37,9 @@ struct Sphere {
   Eigen::Matrix3f axes = Eigen::Matrix3f::Identity();
 };
 
-/// A flat disk spanned by two orthogonal edge vectors of equal length from the centre; u × v is the front's direction
-/// unless flipped. uv: (radius, azimuth/2π) as Mitsuba has it.
+/// A flat ellipse: centre + x u + y v for x² + y² ≤ 1, where u and v are not parallel (conjugate radii, those of a disk
+/// if they are orthogonal and equally long); u × v is the front's direction unless flipped. uv: (r, φ/2π) for
+/// (x, y) = r (cosφ, sinφ), as Mitsuba has it.
 struct Disk {
   Vec3 centre;
   Vec3 u, v;
@@ -194,6 +196,7 @@ struct Scene {
   PixelFilter filter;
   std::optional<int> maxDepth;  ///< longest path in segments, 0 or more, as the file says
   EmitterVisibility emitterVisibility = EmitterVisibility::shown;
+  float scale = 1;                    ///< what all lengths of the file have been multiplied by, a power of two
   std::vector<std::string> notes;     ///< what was read but replaced by ours (integrators, samplers, film options)
   std::vector<std::string> warnings;  ///< what was not taken as it stands, and what lenient reading passed over
 };

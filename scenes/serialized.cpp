@@ -2,7 +2,6 @@
 
 #include <bit>
 #include <cstring>
-#include <fstream>
 #include <limits>
 #include <stdexcept>
 
@@ -167,8 +166,7 @@ TriangleMesh unpack(Inflater& in, int version, bool& faceNormals) {
 }
 
 TriangleMesh readFrom(const std::filesystem::path& path, int index, MeshOptions options) {
-  std::ifstream file(path, std::ios::binary);
-  if (!std::filesystem::is_regular_file(path) || !file) throw std::runtime_error("cannot open");
+  std::ifstream file = openFile(path);
   const std::uint64_t size = std::filesystem::file_size(path);
   if (size < 8) throw std::runtime_error("not a serialized mesh");
   const Extent extent = findMesh(file, size, index);

@@ -139,11 +139,15 @@ std::optional<Rgb> parseColour(std::string_view text) {
   return Eigen::Array3d(values->data()).cast<float>();
 }
 
+Rgb linearOfSrgb(const Rgb& encoded) {
+  return encoded.unaryExpr([](float x) { return fromSrgb(x); });
+}
+
 std::optional<Rgb> parseSrgb(std::string_view text) {
   text = trimmed(text);
   const std::optional<Rgb> encoded = text.starts_with('#') ? parseHexColour(text.substr(1)) : parseColour(text);
   if (!encoded) return std::nullopt;
-  return encoded->unaryExpr([](float x) { return fromSrgb(x); }).eval();
+  return linearOfSrgb(*encoded);
 }
 
 }  // namespace lobe

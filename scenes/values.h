@@ -28,6 +28,9 @@ std::string knownAre(std::string_view wanted, std::string_view names);
 /// One number (grey) or three.
 std::optional<Rgb> parseColour(std::string_view text);
 
+/// The linear colour of a sRGB-encoded one.
+Rgb linearOfSrgb(const Rgb& encoded);
+
 /// sRGB-encoded: as parseColour or "#rrggbb"; the result is linear.
 std::optional<Rgb> parseSrgb(std::string_view text);
 

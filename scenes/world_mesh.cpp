@@ -1,10 +1,18 @@
 #include "scenes/world_mesh.h"
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <numeric>
+#include <span>
 #include <stdexcept>
+#include <tuple>
 
+#include <fmt/format.h>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
+
+#include "scenes/scene_scale.h"
 
 namespace lobe {
 namespace {
@@ -26,6 +34,14 @@ void requireFinite(const TriangleMesh& mesh) {
     if (!uv.allFinite()) throw std::runtime_error("a texture coordinate is not a finite number");
 }
 
+void requireInRange(const TriangleMesh& mesh) {
+  for (const Vec3& p : mesh.positions)
+    if (!isInRange(p))
+      throw std::runtime_error(
+          fmt::format("a vertex at {:g}, {:g}, {:g} in the world: coordinates over {:g} are not supported", p.x(),
+                      p.y(), p.z(), kLargestCoordinate));
+}
+
 Eigen::Vector3d crossOfEdges(const TriangleMesh& mesh, const Triangle& t) {
   const Eigen::Vector3d p = mesh.positions[t[0]].cast<double>();
   return (mesh.positions[t[1]].cast<double>() - p).cross(mesh.positions[t[2]].cast<double>() - p);
@@ -39,18 +55,91 @@ double angleAt(const TriangleMesh& mesh, const Triangle& t, int corner) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
-std::vector<Vec3> smoothNormals(const TriangleMesh& mesh) {
-  std::vector<Eigen::Vector3d> sums(mesh.positions.size(), Eigen::Vector3d::Zero());
+/// Unit, or zero for triangles without area.
+std::vector<Eigen::Vector3d> faceNormals(const TriangleMesh& mesh) {
+  std::vector<Eigen::Vector3d> normals;
+  normals.reserve(mesh.triangles.size());
   for (const Triangle& t : mesh.triangles) {
     const Eigen::Vector3d normal = crossOfEdges(mesh, t).normalized();
-    if (!normal.allFinite()) continue;
-    for (int corner = 0; corner < 3; ++corner) sums[t[corner]] += angleAt(mesh, t, corner) * normal;
+    normals.push_back(normal.allFinite() ? normal : Eigen::Vector3d::Zero());
   }
+  return normals;
+}
+
+std::vector<Vec3> smoothNormals(const TriangleMesh& mesh) {
+  std::vector<Eigen::Vector3d> sums(mesh.positions.size(), Eigen::Vector3d::Zero());
+  const std::vector<Eigen::Vector3d> ofFaces = faceNormals(mesh);
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
+    for (int corner = 0; corner < 3; ++corner)
+      sums[mesh.triangles[i][corner]] += angleAt(mesh, mesh.triangles[i], corner) * ofFaces[i];
   std::vector<Vec3> normals;
   normals.reserve(sums.size());
   for (const Eigen::Vector3d& sum : sums) normals.push_back(unit(sum));
   return normals;
 }
+
+/// Gives triangles vertices of their own where their normals differ by the angle or more. As in Mitsuba 0.6, vertices
+/// count as one when they are equal, whatever their indices, and the triangles around one are grouped greedily: the
+/// first that is left takes all that are near it.
+class SmoothingSplitter {
+ public:
+  SmoothingSplitter(const TriangleMesh& mesh, float degrees)
+      : mesh_(mesh), normals_(faceNormals(mesh)), threshold_(std::cos(degrees * std::numbers::pi / 180.0)) {}
+
+  TriangleMesh run() {
+    result_.triangles.resize(mesh_.triangles.size());
+    std::vector<std::size_t> corners(3 * mesh_.triangles.size());
+    std::iota(corners.begin(), corners.end(), std::size_t{0});
+    std::ranges::sort(corners, [this](std::size_t a, std::size_t b) {
+      const auto keyA = keyOf(a), keyB = keyOf(b);
+      return keyA != keyB ? keyA < keyB : a < b;
+    });
+    for (std::size_t begin = 0, end = 0; begin < corners.size(); begin = end) {
+      while (end < corners.size() && keyOf(corners[end]) == keyOf(corners[begin])) ++end;
+      splitVertex({corners.begin() + static_cast<std::ptrdiff_t>(begin), end - begin});
+    }
+    return std::move(result_);
+  }
+
+ private:
+  std::uint32_t vertexOf(std::size_t corner) const { return mesh_.triangles[corner / 3][corner % 3]; }
+
+  std::tuple<float, float, float, float, float> keyOf(std::size_t corner) const {
+    const std::uint32_t vertex = vertexOf(corner);
+    const Vec3& p = mesh_.positions[vertex];
+    const Vec2 uv = mesh_.uvs.empty() ? Vec2(0, 0) : mesh_.uvs[vertex];
+    return {p.x(), p.y(), p.z(), uv.x(), uv.y()};
+  }
+
+  bool areSmooth(std::size_t a, std::size_t b) const {
+    const Eigen::Vector3d &n = normals_[a / 3], &m = normals_[b / 3];
+    return n == m || n.dot(m) > threshold_;
+  }
+
+  /// corners: of equal vertices; the order of those that are left is kept.
+  void splitVertex(std::span<std::size_t> corners) {
+    while (!corners.empty()) {
+      const std::size_t first = corners.front();
+      const auto vertex = addVertex(vertexOf(first));
+      const auto rest = std::stable_partition(corners.begin(), corners.end(),
+                                              [&](std::size_t corner) { return areSmooth(first, corner); });
+      std::for_each(corners.begin(), rest,
+                    [&](std::size_t corner) { result_.triangles[corner / 3][corner % 3] = vertex; });
+      corners = {rest, corners.end()};
+    }
+  }
+
+  std::uint32_t addVertex(std::uint32_t from) {
+    result_.positions.push_back(mesh_.positions[from]);
+    if (!mesh_.uvs.empty()) result_.uvs.push_back(mesh_.uvs[from]);
+    return static_cast<std::uint32_t>(result_.positions.size() - 1);
+  }
+
+  const TriangleMesh& mesh_;
+  std::vector<Eigen::Vector3d> normals_;
+  double threshold_;
+  TriangleMesh result_;
+};
 
 /// Winds every triangle so that its front is on its vertex normals' side.
 void windByNormals(TriangleMesh& mesh) {
@@ -89,6 +178,8 @@ TriangleMesh toWorldMesh(TriangleMesh mesh, const MeshOptions& options) {
   requireFinite(mesh);
   transform(mesh, options.toWorld);
   requireFinite(mesh);
+  requireInRange(mesh);
+  if (options.maxSmoothAngle) mesh = SmoothingSplitter(mesh, *options.maxSmoothAngle).run();
   if (!mesh.normals.empty())
     windByNormals(mesh);
   else if (!options.faceNormals)

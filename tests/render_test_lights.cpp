@@ -49,6 +49,7 @@ std::vector<LightCase> lightCases() {
   addEmitter(add("sphere from outside", {0.5f, 0, 0}), Sphere{{2, 1, 1}, 0.9f}, 1);
   addEmitter(add("sphere from inside", {0.5f, 0.2f, 0}), Sphere{{0, 0, 0}, 1, true}, 1);
   addEmitter(add("disk", {0, 0, 0}), Disk{{0, 1, 1}, {1.5f, 0, 0}, {0, 0, 1.5f}}, 1);
+  addEmitter(add("ellipse", {0, 0, 0}), Disk{{0, 1, 1}, {1.5f, 0, 0}, {0.6f, 0.1f, 0.8f}}, 1);
   addEmitter(add("cylinder from outside", {2, 0.5f, 0}), Cylinder{{0, 0, -1}, {0, 1, 0}, {-1, 0, 0}, {0, 0, 3}}, 1);
   addEmitter(add("cylinder from inside", {0.5f, 0.2f, 0}), Cylinder{{0, 0, -1}, {0, 1, 0}, {-1, 0, 0}, {0, 0, 3}, true},
              1);
@@ -280,6 +281,9 @@ TEST_CASE("render: photons bring the light that is gathered") {
   }
   SECTION("disk") {
     addEmitter(scene, Disk{{0, 1, 0}, {1, 0, 0}, {0, 0, 1}}, 2);
+  }
+  SECTION("ellipse") {
+    addEmitter(scene, Disk{{0, 1, 0}, {1, 0, 0}, {0.4f, 0.1f, 0.5f}}, 2);
   }
   SECTION("inside a sphere") {
     addEmitter(scene, Sphere{{0, 0, 0}, 1.5f, true}, 2);

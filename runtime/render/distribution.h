@@ -14,7 +14,10 @@ namespace lobe {
 class DiscreteDistribution {
  public:
   DiscreteDistribution() = default;
-  explicit DiscreteDistribution(std::span<const float> weights) : cumulative_(weights.size()), guide_(weights.size()) {
+  explicit DiscreteDistribution(std::span<const float> weights)
+      : DiscreteDistribution(std::vector<double>(weights.begin(), weights.end())) {}
+  explicit DiscreteDistribution(const std::vector<double>& weights)
+      : cumulative_(weights.size()), guide_(weights.size()) {
     for (std::size_t i = 0; i < weights.size(); ++i) cumulative_[i] = total_ += weights[i];
     std::size_t i = 0;
     for (std::size_t k = 0; k < guide_.size(); ++k) {

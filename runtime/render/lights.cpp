@@ -9,14 +9,15 @@
 namespace lobe {
 namespace {
 
-DiscreteDistribution trianglesByArea(const TriangleMesh& mesh) {
-  std::vector<float> areas;
+/// In double precision, as squares of the areas of small or large triangles leave the range of floats.
+std::vector<double> areasOfTriangles(const TriangleMesh& mesh) {
+  std::vector<double> areas;
   areas.reserve(mesh.triangles.size());
   for (const auto& [i, j, k] : mesh.triangles) {
-    const Vec3& a = mesh.positions[i];
-    areas.push_back(0.5f * (mesh.positions[j] - a).cross(mesh.positions[k] - a).norm());
+    const Eigen::Vector3d a = mesh.positions[i].cast<double>();
+    areas.push_back(0.5 * (mesh.positions[j].cast<double>() - a).cross(mesh.positions[k].cast<double>() - a).norm());
   }
-  return DiscreteDistribution(areas);
+  return areas;
 }
 
 /// 0 for what has triangles or stands for other shapes.
@@ -88,7 +89,8 @@ Lights::Lights(const Scene& scene, const Eigen::AlignedBox3f& bounds)
     if (!shape.emitter) continue;
     AreaLight light{&shape, 0.0f, {}};
     if (const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry)) {
-      light.triangles = trianglesByArea(*mesh);
+      const std::vector<double> areas = areasOfTriangles(*mesh);
+      light.triangles = DiscreteDistribution(areas);
       light.area = static_cast<float>(light.triangles.total());
     } else {
       light.area = areaOfAnalytic(shape.geometry);

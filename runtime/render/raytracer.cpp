@@ -107,6 +107,29 @@ void fillInstance(RTCGeometry geometry, const Instance& instance, RTCScene group
   rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT4X4_COLUMN_MAJOR, instance.toWorld.matrix().data());
 }
 
+/// The largest coordinate of the places that rays start from: surfaces, the camera, lights, and for photons from far
+/// away a sphere about the scene.
+double reachOfRays(const Scene& scene, const Eigen::AlignedBox3f& bounds) {
+  Eigen::AlignedBox3f box = bounds;
+  box.extend(Vec3(scene.camera.toWorld.topRightCorner<3, 1>()));
+  for (const DeltaLight& light : scene.lights)
+    std::visit(
+        [&](const auto& l) {
+          if constexpr (requires { l.position; }) box.extend(l.position);
+        },
+        light);
+  constexpr double kSphere = 4;
+  return kSphere * box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff();
+}
+
+/// Whether rays keep origins and directions that Embree takes when they are transformed into the instance's group.
+/// reach: the largest coordinate of their origins.
+bool isTraceable(const Instance& instance, double reach) {
+  constexpr double kEmbreeLimit = 1e18;
+  const Eigen::Matrix3d inverse = instance.toWorld.linear().cast<double>().inverse();
+  return inverse.cwiseAbs().rowwise().sum().maxCoeff() * std::max(1.0, reach) < kEmbreeLimit;
+}
+
 RTCGeometryType geometryType(const Shape& shape) {
   if (std::holds_alternative<TriangleMesh>(shape.geometry)) return RTC_GEOMETRY_TYPE_TRIANGLE;
   return std::holds_alternative<Instance>(shape.geometry) ? RTC_GEOMETRY_TYPE_INSTANCE : RTC_GEOMETRY_TYPE_USER;
@@ -129,11 +152,12 @@ struct RayTracer::Embree {
         [](void* text, RTCError, const char* message) { *static_cast<std::string*>(text) = message ? message : "?"; },
         &error);
     for (const ShapeGroup& group : source.groups) {
-      Eigen::AlignedBox3f box;
-      groups.push_back(build(group.shapes, box));
-      groupBounds.push_back(box);
+      groupBounds.push_back(boundsOfAll(group.shapes));
+      groups.push_back(build(group.shapes));
     }
-    scene = build(source.shapes, bounds);
+    bounds = boundsOfAll(source.shapes);
+    reach = reachOfRays(source, bounds);
+    scene = build(source.shapes);
   }
   Embree(const Embree&) = delete;
   Embree& operator=(const Embree&) = delete;
@@ -144,15 +168,20 @@ struct RayTracer::Embree {
   }
 
  private:
-  RTCScene build(const std::vector<Shape>& shapes, Eigen::AlignedBox3f& box) {
+  Eigen::AlignedBox3f boundsOfAll(const std::vector<Shape>& shapes) const {
+    Eigen::AlignedBox3f box;
+    for (const Shape& shape : shapes) box.extend(boundsOf(shape.geometry, groupBounds));
+    return box;
+  }
+
+  RTCScene build(const std::vector<Shape>& shapes) {
     RTCScene result = rtcNewScene(device);
     // Robust: rays do not slip through shared edges. High quality: built once, traced hundreds of millions of times.
     rtcSetSceneFlags(result, RTC_SCENE_FLAG_ROBUST);
     rtcSetSceneBuildQuality(result, RTC_BUILD_QUALITY_HIGH);
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       const Eigen::AlignedBox3f shapeBox = boundsOf(shapes[i].geometry, groupBounds);
-      if (shapeBox.isEmpty()) continue;
-      box.extend(shapeBox);
+      if (shapeBox.isEmpty() || isTooSmall(shapes[i], shapeBox)) continue;
       add(result, shapes[i], static_cast<unsigned>(i));
     }
     const Stopwatch watch;
@@ -160,6 +189,15 @@ struct RayTracer::Embree {
     buildSeconds += watch.seconds();
     if (!error.empty()) throw std::runtime_error(fmt::format("Embree: {}", error));
     return result;
+  }
+
+  /// What cannot be traced is left out where it is beyond the precision of coordinates.
+  bool isTooSmall(const Shape& shape, const Eigen::AlignedBox3f& shapeBox) const {
+    const auto* instance = std::get_if<Instance>(&shape.geometry);
+    if (!instance || isTraceable(*instance, reach)) return false;
+    if (shapeBox.sizes().maxCoeff() > 1e-6 * reach)
+      throw std::runtime_error(fmt::format("shape \"{}\": the instance is too flat to be traced", shape.name));
+    return true;
   }
 
   void add(RTCScene to, const Shape& shape, unsigned id) {
@@ -175,6 +213,7 @@ struct RayTracer::Embree {
     rtcReleaseGeometry(geometry);
   }
 
+  double reach = 0;  // the largest coordinate of a ray's origin
   std::string error;
 };
 

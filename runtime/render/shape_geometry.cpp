@@ -1,6 +1,7 @@
 #include "runtime/render/shape_geometry.h"
 
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "materials/sampling.h"
@@ -10,9 +11,9 @@ namespace {
 
 using Vec3d = Eigen::Vector3d;
 
-// Half the box about a circle of which u and v are two orthogonal radii.
-Vec3 extentOfCircle(const Vec3& u, const Vec3& v) {
-  return (u.array().square() + v.array().square()).sqrt();
+// Half the box about an ellipse of which u and v are conjugate radii: the largest |cosφ u + sinφ v| along each axis.
+Vec3 extentOfEllipse(const Vec3& u, const Vec3& v) {
+  return (u.cast<double>().array().square() + v.cast<double>().array().square()).sqrt().cast<float>();
 }
 
 }  // namespace
@@ -44,11 +45,16 @@ std::optional<double> intersectShape(const Disk& disk, const Vec3d& origin, cons
   const Vec3d centre = disk.centre.cast<double>();
   const double t = (centre - origin).dot(normal) / direction.dot(normal);
   if (!range.contains(t)) return std::nullopt;  // also where the ray runs along the plane (t is no number)
-  const Vec3d p = origin + t * direction - centre;
-  const double x = p.dot(u) / u.squaredNorm();
-  const double y = p.dot(v) / v.squaredNorm();
-  if (x * x + y * y > 1.0) return std::nullopt;
+  const Eigen::Vector2d p = diskCoordinates(disk, origin + t * direction);
+  if (p.squaredNorm() > 1.0) return std::nullopt;
   return t;
+}
+
+Eigen::Vector2d diskCoordinates(const Disk& disk, const Vec3d& point) {
+  const Vec3d u = disk.u.cast<double>(), v = disk.v.cast<double>();
+  const Vec3d p = point - disk.centre.cast<double>();
+  const Vec3d normal = u.cross(v);
+  return Eigen::Vector2d(p.cross(v).dot(normal), u.cross(p).dot(normal)) / normal.squaredNorm();
 }
 
 std::optional<double> intersectShape(const Cylinder& cylinder, const Vec3d& origin, const Vec3d& direction,
@@ -85,12 +91,12 @@ Eigen::AlignedBox3f boundsOf(const Sphere& sphere) {
 }
 
 Eigen::AlignedBox3f boundsOf(const Disk& disk) {
-  const Vec3 r = extentOfCircle(disk.u, disk.v);
+  const Vec3 r = extentOfEllipse(disk.u, disk.v);
   return {disk.centre - r, disk.centre + r};
 }
 
 Eigen::AlignedBox3f boundsOf(const Cylinder& cylinder) {
-  const Vec3 r = extentOfCircle(cylinder.u, cylinder.v);
+  const Vec3 r = extentOfEllipse(cylinder.u, cylinder.v);
   Eigen::AlignedBox3f box(cylinder.base - r, cylinder.base + r);
   return box.extend(box.translated(cylinder.axis));
 }
@@ -100,7 +106,7 @@ float areaOf(const Sphere& sphere) {
 }
 
 float areaOf(const Disk& disk) {
-  return kPi * disk.u.cross(disk.v).norm();
+  return static_cast<float>(std::numbers::pi * disk.u.cast<double>().cross(disk.v.cast<double>()).norm());
 }
 
 float areaOf(const Cylinder& cylinder) {

@@ -28,6 +28,9 @@ Eigen::AlignedBox3f boundsOf(const Sphere& sphere);
 Eigen::AlignedBox3f boundsOf(const Disk& disk);
 Eigen::AlignedBox3f boundsOf(const Cylinder& cylinder);
 
+/// The point as x u + y v from the centre, in the plane of the disk, which it may be off.
+Eigen::Vector2d diskCoordinates(const Disk& disk, const Eigen::Vector3d& point);
+
 float areaOf(const Sphere& sphere);
 float areaOf(const Disk& disk);
 float areaOf(const Cylinder& cylinder);

@@ -3,6 +3,7 @@
 #include <stdexcept>
 
 #include "materials/sampling.h"
+#include "runtime/render/shape_geometry.h"
 
 namespace lobe {
 namespace {
@@ -91,11 +92,11 @@ Resolved resolve(const Sphere& sphere, const Ray& ray, const Hit& hit) {
 }
 
 Resolved resolve(const Disk& disk, const Ray& ray, const Hit& hit) {
-  const Vec3 p = ray.origin + hit.t * ray.direction - disk.centre;
-  const float x = p.dot(disk.u) / disk.u.squaredNorm();
-  const float y = p.dot(disk.v) / disk.v.squaredNorm();
-  const SurfacePoint point = pointOnDisk(disk, x, y);
-  return {point, point.normal, diskDerivatives(disk, x, y)};
+  const Eigen::Vector3d position =
+      ray.origin.cast<double>() + (static_cast<double>(hit.t) * ray.direction.cast<double>());
+  const Vec2 p = diskCoordinates(disk, position).cast<float>();
+  const SurfacePoint point = pointOnDisk(disk, p.x(), p.y());
+  return {point, point.normal, diskDerivatives(disk, p.x(), p.y())};
 }
 
 Resolved resolve(const Cylinder& cylinder, const Ray& ray, const Hit& hit) {
@@ -141,11 +142,12 @@ Vec3 facing(const Vec3& normal, const Vec3& side) {
   return normal.dot(side) < 0.0f ? Vec3(-normal) : normal;
 }
 
-Frame shadingFrame(const Bsdf* bsdf, const Resolved& r) {
+/// unit: of the lengths that a BSDF knows, such as the height of bumps, in those of the scene.
+Frame shadingFrame(const Bsdf* bsdf, const Resolved& r, float unit) {
   const Frame frame = Frame::fromTangent(facing(r.shadingNormal, r.point.normal), r.derivatives.dpdu);
   if (!bsdf) return frame;
-  const Vec3 local =
-      bsdf->perturbedNormal(r.point.uv, frame.toLocal(r.derivatives.dpdu), frame.toLocal(r.derivatives.dpdv));
+  const Vec3 local = bsdf->perturbedNormal(r.point.uv, frame.toLocal(r.derivatives.dpdu / unit),
+                                           frame.toLocal(r.derivatives.dpdv / unit));
   if (local == Vec3::UnitZ() || !local.allFinite()) return frame;
   return Frame::fromTangent(facing(frame.toWorld(local).normalized(), r.point.normal), r.derivatives.dpdu);
 }
@@ -206,7 +208,7 @@ SurfaceHit makeSurfaceHit(const Scene& scene, const Ray& ray, const Hit& hit) {
   static_cast<SurfacePoint&>(result) = r.point;
   result.bsdf = shape.material < 0 ? nullptr : scene.materials[shape.material].bsdf.get();
   result.emitter = shape.emitter ? &*shape.emitter : nullptr;
-  result.frame = shadingFrame(result.bsdf, r);
+  result.frame = shadingFrame(result.bsdf, r, scene.scale);
   result.woWorld = -ray.direction;
   result.wo = result.frame.toLocal(result.woWorld);
   result.distance = hit.t;
