@@ -61,10 +61,15 @@ class BitmapTexture final : public Texture {
   std::array<int, 2> resolution() const override { return {image_->width, image_->height}; }
   TextureRange range() const override {
     TextureRange range = rangeOf(*image_);
-    const auto uses = [this](Wrap mode) { return options_.wrapU == mode || options_.wrapV == mode; };
     if (uses(Wrap::zero)) range = {std::min(range.smallest, 0.0f), std::max(range.largest, 0.0f)};
     if (uses(Wrap::one)) range = {std::min(range.smallest, 1.0f), std::max(range.largest, 1.0f)};
     return range;
+  }
+  Rgb largest() const override {
+    Rgb largest = image_->pixels.front();
+    for (const Rgb& pixel : image_->pixels) largest = (pixel > largest).select(pixel, largest);
+    if (uses(Wrap::zero)) largest = largest.max(0.0f);
+    return uses(Wrap::one) ? Rgb(largest.max(1.0f)) : largest;
   }
   std::uint64_t fingerprint() const override {
     Fingerprint hash;
@@ -78,6 +83,8 @@ class BitmapTexture final : public Texture {
   }
 
  private:
+  bool uses(Wrap mode) const { return options_.wrapU == mode || options_.wrapV == mode; }
+
   Rgb bilinear(float x, float y) const {
     const float x0 = std::floor(x), y0 = std::floor(y), fx = x - x0, fy = y - y0;
     const Rgb top = pixel(x0, y0) * (1 - fx) + pixel(x0 + 1, y0) * fx;

@@ -94,12 +94,16 @@ class Bsdf {
   /// Whether light may pass to the other side of the surface.
   virtual bool transmits() const { return false; }
 
-  /// The local shading normal after bump or normal mapping, given the derivatives of position by u and v in the local
-  /// frame; UnitZ for all but the mapping models.
-  virtual Vec3 perturbedNormal(const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const {
-    (void)uv, (void)dpdu, (void)dpdv;
+  /// The local shading normal after bump or normal mapping, as it is seen from wo, given the derivatives of position by
+  /// u and v; all in the frame before mapping. UnitZ for all but the mapping models.
+  virtual Vec3 perturbedNormal(const Vec3& wo, const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const {
+    (void)wo, (void)uv, (void)dpdu, (void)dpdv;
     return Vec3::UnitZ();
   }
+
+  /// Whether light that grazes the surface is dimmed according to how far the mapped normal leans, as
+  /// terminatorRoughness2 says. The host does that, since eval only knows the frame after mapping.
+  virtual bool shadowsTerminator() const { return false; }
 };
 
 using BsdfPtr = std::shared_ptr<const Bsdf>;

@@ -1,8 +1,7 @@
 // Turns the shading normal as if the surface were displaced along it by a texture.
 
-#include "materials/frame.h"
 #include "materials/models.h"
-#include "materials/nested_bsdf.h"
+#include "materials/normal_mapping.h"
 
 namespace lobe {
 namespace {
@@ -11,25 +10,23 @@ namespace {
 /// above the rounding of coordinates of a few units.
 constexpr float kHalfStep = 0x1p-13f;
 
-class BumpMap final : public NestedBsdf {
+class BumpMap final : public NormalMapping {
  public:
-  BumpMap(BsdfPtr nested, TexturePtr displacement, float scale)
-      : NestedBsdf(std::move(nested)), displacement_(std::move(displacement)), scale_(scale) {}
+  BumpMap(BsdfPtr nested, const Options& options, TexturePtr displacement, float scale)
+      : NormalMapping(std::move(nested), options), displacement_(std::move(displacement)), scale_(scale) {}
 
-  Vec3 perturbedNormal(const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const override {
+ private:
+  std::optional<Tilted> tilted(const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const override {
     // The displaced position is p + h(u,v) z; its derivatives, curvature of the base left out, span the new tangent
     // plane.
     const Vec3 du(dpdu.x(), dpdu.y(), derivative(uv, Vec2(kHalfStep, 0.0f)));
     const Vec3 dv(dpdv.x(), dpdv.y(), derivative(uv, Vec2(0.0f, kHalfStep)));
     const Vec3 cross = du.cross(dv);
     const float length = cross.norm();
-    if (!(length > 0.0f) || cross.z() == 0.0f) return nested().perturbedNormal(uv, dpdu, dpdv);
-    const Vec3 normal = cross / (cross.z() > 0.0f ? length : -length);  // mirrored coordinates turn it over
-    const Frame frame = Frame::fromTangent(normal, du);
-    return frame.toWorld(nested().perturbedNormal(uv, frame.toLocal(du), frame.toLocal(dv)));
+    if (!(length > 0.0f) || cross.z() == 0.0f) return std::nullopt;
+    return Tilted{cross / (cross.z() > 0.0f ? length : -length), du, dv};  // mirrored coordinates turn it over
   }
 
- private:
   /// By central differences of the displacement's luminance, over the step as it came out in floating point.
   float derivative(const Vec2& uv, const Vec2& halfStep) const {
     const Vec2 ahead = uv + halfStep;
@@ -46,8 +43,8 @@ class BumpMap final : public NestedBsdf {
 }  // namespace
 
 BsdfPtr makeBumpMap(const Parameters& parameters) {
-  return std::make_shared<BumpMap>(parameters.onlyChild(), parameters.onlyTexture(),
-                                   static_cast<float>(parameters.number("scale", 1.0)));
+  return std::make_shared<BumpMap>(parameters.onlyChild(), NormalMapping::readOptions(parameters),
+                                   parameters.onlyTexture(), static_cast<float>(parameters.number("scale", 1.0)));
 }
 
 }  // namespace lobe

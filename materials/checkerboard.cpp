@@ -21,6 +21,7 @@ class CheckerboardTexture final : public Texture {
     const TextureRange a = a_->range(), b = b_->range();
     return {std::min(a.smallest, b.smallest), std::max(a.largest, b.largest)};
   }
+  Rgb largest() const override { return a_->largest().max(b_->largest()); }
   std::uint64_t fingerprint() const override {
     Fingerprint hash;
     hash.text("checkerboard");

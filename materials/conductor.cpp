@@ -3,6 +3,7 @@
 #include "materials/fresnel.h"
 #include "materials/ior.h"
 #include "materials/models.h"
+#include "materials/reflectance.h"
 
 namespace lobe {
 namespace {
@@ -35,7 +36,8 @@ class Conductor final : public Bsdf {
 }  // namespace
 
 BsdfPtr makeConductor(const Parameters& parameters) {
-  return std::make_shared<Conductor>(readConductor(parameters), parameters.texture("specular_reflectance", grey(1.0f)));
+  return std::make_shared<Conductor>(readConductor(parameters),
+                                     readReflectance(parameters, {"specular_reflectance", grey(1.0f)}));
 }
 
 }  // namespace lobe

@@ -10,6 +10,7 @@ class ConstantTexture final : public Texture {
   Rgb eval(const Vec2&) const override { return colour_; }
   Rgb mean() const override { return colour_; }
   TextureRange range() const override { return {luminance(colour_), luminance(colour_)}; }
+  Rgb largest() const override { return colour_; }
   std::optional<Rgb> constantColour() const override { return colour_; }
   std::uint64_t fingerprint() const override {
     Fingerprint hash;

@@ -1,6 +1,7 @@
 // Lambert's law on the other side: what arrives at one side leaves the other evenly, as through thin paper.
 
 #include "materials/models.h"
+#include "materials/reflectance.h"
 #include "materials/sampling.h"
 
 namespace lobe {
@@ -47,7 +48,7 @@ class DiffuseTransmitter final : public Bsdf {
 }  // namespace
 
 BsdfPtr makeDiffTrans(const Parameters& parameters) {
-  return std::make_shared<DiffuseTransmitter>(parameters.texture("transmittance", grey(0.5f)));
+  return std::make_shared<DiffuseTransmitter>(readReflectance(parameters, {"transmittance", grey(0.5f)}));
 }
 
 }  // namespace lobe

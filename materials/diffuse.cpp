@@ -1,6 +1,7 @@
 // Lambert's ideal diffuse reflection.
 
 #include "materials/models.h"
+#include "materials/reflectance.h"
 #include "materials/sampling.h"
 
 namespace lobe {
@@ -45,7 +46,7 @@ class Diffuse final : public Bsdf {
 BsdfPtr makeDiffuse(const Parameters& parameters) {
   // The second name is that of Mitsuba 0.4 and before.
   const char* name = parameters.has("diffuse_reflectance") ? "diffuse_reflectance" : "reflectance";
-  return std::make_shared<Diffuse>(parameters.texture(name, grey(0.5f)));
+  return std::make_shared<Diffuse>(readReflectance(parameters, {name, grey(0.5f)}));
 }
 
 }  // namespace lobe

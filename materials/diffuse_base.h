@@ -15,7 +15,8 @@ struct DiffuseBase {
   /// internalReflectance: of the coating, for diffuse light from within.
   Rgb colour(const Vec2& uv, float internalReflectance) const {
     const Rgb diffuse = reflectance->eval(uv);
-    const Rgb repeated = nonlinear ? Rgb(diffuse * internalReflectance) : grey(internalReflectance);
+    // A reflectance above 1 may make the series of bounces diverge: it ends where it would be a hundredfold.
+    const Rgb repeated = nonlinear ? Rgb((diffuse * internalReflectance).min(0.99f)) : grey(internalReflectance);
     return diffuse * inverseEta2 / (1.0f - repeated);
   }
 };

@@ -1,6 +1,7 @@
 // Lets part of the light pass straight through, as if there were holes too small to see.
 
 #include "materials/models.h"
+#include "materials/reflectance.h"
 
 namespace lobe {
 namespace {
@@ -55,9 +56,10 @@ class Mask final : public Bsdf {
 
   bool transmits() const override { return true; }
 
-  Vec3 perturbedNormal(const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const override {
-    return nested_->perturbedNormal(uv, dpdu, dpdv);
+  Vec3 perturbedNormal(const Vec3& wo, const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const override {
+    return nested_->perturbedNormal(wo, uv, dpdu, dpdv);
   }
+  bool shadowsTerminator() const override { return nested_->shadowsTerminator(); }
 
  private:
   /// Probabilities of passing through and of the nested model's delta part; the rest is its smooth part.
@@ -81,7 +83,7 @@ class Mask final : public Bsdf {
 }  // namespace
 
 BsdfPtr makeMask(const Parameters& parameters) {
-  return std::make_shared<Mask>(parameters.onlyChild(), parameters.texture("opacity", grey(0.5f)));
+  return std::make_shared<Mask>(parameters.onlyChild(), readReflectance(parameters, {"opacity", grey(0.5f)}));
 }
 
 }  // namespace lobe

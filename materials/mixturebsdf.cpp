@@ -49,12 +49,15 @@ PartWeights readWeights(const Parameters& parameters, std::size_t parts) {
   double total = 0.0;
   for (const double number : numbers) total += number;
   if (!(total > 0.0)) refuse("the sum of weights must be positive");
-  // As Mitsuba 0.6: what would add energy is scaled down, unless the file insists.
-  if (!parameters.flag("ensure_energy_conservation", true) && total > 1.0)
-    refuse(fmt::format("the sum of weights must be at most 1, not {}", total));
+  // As Mitsuba 0.6: what may add energy is scaled down, unless the file insists, as the parts may be dark enough.
+  const bool scales = parameters.flag("ensure_energy_conservation", true) && total > 1.0;
+  if (scales)
+    parameters.warn("weights", fmt::format("the sum of weights is {:.4g}: they are scaled by {:.4g} to a sum of 1 "
+                                           "(ensureEnergyConservation)",
+                                           total, 1.0 / total));
   PartWeights weights{};
   std::ranges::transform(numbers, weights.begin(),
-                         [&](double number) { return static_cast<float>(number / std::max(1.0, total)); });
+                         [&](double number) { return static_cast<float>(number / (scales ? total : 1.0)); });
   return weights;
 }
 

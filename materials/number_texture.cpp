@@ -10,6 +10,7 @@ class NumberTexture final : public Texture {
   Rgb eval(const Vec2& uv) const override { return grey(nested_->evalNumber(uv)); }
   Rgb mean() const override { return grey(luminance(nested_->mean())); }
   TextureRange range() const override { return nested_->range(); }
+  Rgb largest() const override { return grey(nested_->range().largest); }
   std::array<int, 2> resolution() const override { return nested_->resolution(); }
   std::uint64_t fingerprint() const override {
     Fingerprint hash;

@@ -43,6 +43,10 @@ void Parameters::set(const std::string& name, ParameterValue value, std::ptrdiff
   entries_.insert_or_assign(name, Entry{std::move(value), location, false});
 }
 
+void Parameters::setDefault(const std::string& name, ParameterValue value) {
+  entries_.try_emplace(name, Entry{std::move(value), 0, true});
+}
+
 const Parameters::Entry* Parameters::find(std::string_view name) const {
   asked_.emplace(name);
   const auto it = entries_.find(name);

@@ -36,6 +36,8 @@ class Parameters {
   void set(const std::string& name, ParameterValue value, std::ptrdiff_t location = 0);
   /// As if it had never been given.
   void erase(const std::string& name) { entries_.erase(name); }
+  /// The value of a parameter that the file does not give. It is as if it were there, but nobody has to ask for it.
+  void setDefault(const std::string& name, ParameterValue value);
   void addChild(BsdfPtr bsdf) { children_.push_back(std::move(bsdf)); }
 
   /// Of all names and values, textures by what they show. Not of the children, nor of file names, which say where

@@ -10,6 +10,7 @@
 #include "materials/frame.h"
 #include "materials/lobe_on_diffuse.h"
 #include "materials/models.h"
+#include "materials/reflectance.h"
 
 namespace lobe {
 namespace {
@@ -66,9 +67,10 @@ BsdfPtr makePhong(const Parameters& parameters) {
   const double exponent = parameters.number("exponent", 30.0);
   if (!(exponent >= 0.0 && exponent <= 1e7))
     throw ParameterError("exponent", fmt::format("exponent must be in [0, 1e7], not {}", exponent));
-  return std::make_shared<LobeOnDiffuse>(std::make_shared<PhongLobe>(exponent),
-                                         parameters.texture("specular_reflectance", grey(0.2f)),
-                                         parameters.texture("diffuse_reflectance", grey(0.5f)));
+  auto [specular, diffuse] =
+      readReflectances(parameters, {"specular_reflectance", grey(0.2f)}, {"diffuse_reflectance", grey(0.5f)});
+  return std::make_shared<LobeOnDiffuse>(std::make_shared<PhongLobe>(exponent), std::move(specular),
+                                         std::move(diffuse));
 }
 
 }  // namespace lobe

@@ -4,6 +4,7 @@
 #include "materials/fresnel.h"
 #include "materials/ior.h"
 #include "materials/models.h"
+#include "materials/reflectance.h"
 #include "materials/sampling.h"
 
 namespace lobe {
@@ -78,9 +79,10 @@ class Plastic final : public Bsdf {
 
 BsdfPtr makePlastic(const Parameters& parameters) {
   const double eta = readRelativeIor(parameters, "polypropylene");
-  DiffuseBase base{parameters.texture("diffuse_reflectance", grey(0.5f)), static_cast<float>(1.0 / (eta * eta)),
-                   parameters.flag("nonlinear", false)};
-  return std::make_shared<Plastic>(eta, std::move(base), parameters.texture("specular_reflectance", grey(1.0f)));
+  DiffuseBase base{readReflectance(parameters, {"diffuse_reflectance", grey(0.5f)}),
+                   static_cast<float>(1.0 / (eta * eta)), parameters.flag("nonlinear", false)};
+  return std::make_shared<Plastic>(eta, std::move(base),
+                                   readReflectance(parameters, {"specular_reflectance", grey(1.0f)}));
 }
 
 }  // namespace lobe

@@ -13,6 +13,7 @@
 #include "materials/models.h"
 #include "materials/principled_diffuse.h"
 #include "materials/principled_specular.h"
+#include "materials/reflectance.h"
 #include "materials/sampling.h"
 
 namespace lobe {
@@ -329,10 +330,17 @@ TexturePtr readWeight(const Parameters& parameters, const std::string& name, flo
 
 Textures readTextures(const Parameters& parameters) {
   const auto weight = [&](const char* name, float fallback) { return readWeight(parameters, name, fallback); };
-  return {weight("base_color", 0.5f), weight("roughness", 0.5f),      weight("anisotropic", 0.0f),
-          weight("metallic", 0.0f),   weight("spec_trans", 0.0f),     weight("spec_tint", 0.0f),
-          weight("sheen", 0.0f),      weight("sheen_tint", 0.0f),     weight("flatness", 0.0f),
-          weight("clearcoat", 0.0f),  weight("clearcoat_gloss", 0.0f)};
+  return {readReflectance(parameters, {"base_color", grey(0.5f)}),
+          weight("roughness", 0.5f),
+          weight("anisotropic", 0.0f),
+          weight("metallic", 0.0f),
+          weight("spec_trans", 0.0f),
+          weight("spec_tint", 0.0f),
+          weight("sheen", 0.0f),
+          weight("sheen_tint", 0.0f),
+          weight("flatness", 0.0f),
+          weight("clearcoat", 0.0f),
+          weight("clearcoat_gloss", 0.0f)};
 }
 
 float readRate(const Parameters& parameters, const std::string& name) {

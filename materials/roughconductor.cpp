@@ -6,6 +6,7 @@
 #include "materials/ior.h"
 #include "materials/microfacet_lobe.h"
 #include "materials/models.h"
+#include "materials/reflectance.h"
 #include "materials/roughness.h"
 
 namespace lobe {
@@ -83,7 +84,7 @@ class RoughConductor final : public Bsdf {
 
 BsdfPtr makeRoughConductor(const Parameters& parameters) {
   return std::make_shared<RoughConductor>(Roughness::read(parameters), readConductor(parameters),
-                                          parameters.texture("specular_reflectance", grey(1.0f)));
+                                          readReflectance(parameters, {"specular_reflectance", grey(1.0f)}));
 }
 
 }  // namespace lobe

@@ -6,6 +6,7 @@
 #include "materials/dielectric_lobe.h"
 #include "materials/ior.h"
 #include "materials/models.h"
+#include "materials/reflectance.h"
 #include "materials/rough_interface.h"
 #include "materials/rough_transmittance.h"
 #include "materials/roughness.h"
@@ -133,8 +134,8 @@ BsdfPtr makeRoughDielectric(const Parameters& parameters) {
   // Without a difference every normal lets light straight through: there is no half vector.
   if (std::abs(eta - 1.0) < 1e-6) throw ParameterError("int_ior", "int_ior and ext_ior must differ");
   return std::make_shared<RoughDielectric>(Roughness::read(parameters), eta,
-                                           parameters.texture("specular_reflectance", grey(1.0f)),
-                                           parameters.texture("specular_transmittance", grey(1.0f)));
+                                           readReflectance(parameters, {"specular_reflectance", grey(1.0f)}),
+                                           readReflectance(parameters, {"specular_transmittance", grey(1.0f)}));
 }
 
 }  // namespace lobe

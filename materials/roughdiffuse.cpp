@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "materials/models.h"
+#include "materials/reflectance.h"
 #include "materials/sampling.h"
 
 namespace lobe {
@@ -182,7 +183,8 @@ class RoughDiffuse final : public Bsdf {
 
 BsdfPtr makeRoughDiffuse(const Parameters& parameters) {
   const char* name = parameters.has("diffuse_reflectance") ? "diffuse_reflectance" : "reflectance";
-  return std::make_shared<RoughDiffuse>(parameters.texture(name, grey(0.5f)), parameters.texture("alpha", grey(0.2f)),
+  return std::make_shared<RoughDiffuse>(readReflectance(parameters, {name, grey(0.5f)}),
+                                        parameters.texture("alpha", grey(0.2f)),
                                         parameters.flag("use_fast_approx", false));
 }
 

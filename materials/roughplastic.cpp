@@ -4,6 +4,7 @@
 #include "materials/diffuse_base.h"
 #include "materials/ior.h"
 #include "materials/models.h"
+#include "materials/reflectance.h"
 #include "materials/rough_transmittance.h"
 #include "materials/roughness.h"
 #include "materials/sampling.h"
@@ -100,10 +101,10 @@ BsdfPtr makeRoughPlastic(const Parameters& parameters) {
   Roughness roughness = Roughness::read(parameters);
   if (!roughness.isotropic()) throw ParameterError("alpha_u", "roughplastic is isotropic: give alpha");
   const double eta = readRelativeIor(parameters, "polypropylene");
-  DiffuseBase base{parameters.texture("diffuse_reflectance", grey(0.5f)), static_cast<float>(1.0 / (eta * eta)),
-                   parameters.flag("nonlinear", false)};
+  DiffuseBase base{readReflectance(parameters, {"diffuse_reflectance", grey(0.5f)}),
+                   static_cast<float>(1.0 / (eta * eta)), parameters.flag("nonlinear", false)};
   return std::make_shared<RoughPlastic>(std::move(roughness), eta, std::move(base),
-                                        parameters.texture("specular_reflectance", grey(1.0f)));
+                                        readReflectance(parameters, {"specular_reflectance", grey(1.0f)}));
 }
 
 }  // namespace lobe

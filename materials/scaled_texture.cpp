@@ -20,6 +20,7 @@ class ScaledTexture final : public Texture {
     return {smallest, largest};
   }
   std::array<int, 2> resolution() const override { return nested_->resolution(); }
+  Rgb largest() const override { return nested_->largest() * scale_; }
   std::uint64_t fingerprint() const override {
     Fingerprint hash;
     hash.text("scale");

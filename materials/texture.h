@@ -28,6 +28,8 @@ class Texture {
   virtual Rgb mean() const = 0;
   /// Bounds of the colour's luminance over all uv, tight but for coloured scales of colours; equal for a constant.
   virtual TextureRange range() const = 0;
+  /// The largest value of each component over all uv; a bound where textures are combined, else exact.
+  virtual Rgb largest() const = 0;
   /// The colour of a texture that is made to have only one; nullopt for any other.
   virtual std::optional<Rgb> constantColour() const { return std::nullopt; }
   /// Width and height in pixels, of which only the ratio counts: how wide a projector's picture is.

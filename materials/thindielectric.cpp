@@ -5,6 +5,7 @@
 #include "materials/fresnel.h"
 #include "materials/ior.h"
 #include "materials/models.h"
+#include "materials/reflectance.h"
 
 namespace lobe {
 namespace {
@@ -55,8 +56,8 @@ class ThinDielectric final : public Bsdf {
 
 BsdfPtr makeThinDielectric(const Parameters& parameters) {
   return std::make_shared<ThinDielectric>(readRelativeIor(parameters, "bk7"),
-                                          parameters.texture("specular_reflectance", grey(1.0f)),
-                                          parameters.texture("specular_transmittance", grey(1.0f)));
+                                          readReflectance(parameters, {"specular_reflectance", grey(1.0f)}),
+                                          readReflectance(parameters, {"specular_transmittance", grey(1.0f)}));
 }
 
 }  // namespace lobe

@@ -57,10 +57,13 @@ class TwoSided final : public Bsdf {
     return wo.z() > 0.0f ? front_->albedo(wo, uv) : back_->albedo(flipped(wo), uv);
   }
 
-  /// The front's: the side is not known here.
-  Vec3 perturbedNormal(const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const override {
-    return front_->perturbedNormal(uv, dpdu, dpdv);
+  /// On the back the map is that of the mirrored surface, whose relief comes towards the viewer as it does in front.
+  Vec3 perturbedNormal(const Vec3& wo, const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const override {
+    if (wo.z() > 0.0f) return front_->perturbedNormal(wo, uv, dpdu, dpdv);
+    const Vec3 mirrored = back_->perturbedNormal(flipped(wo), uv, flipped(dpdu), flipped(dpdv));
+    return {-mirrored.x(), -mirrored.y(), mirrored.z()};
   }
+  bool shadowsTerminator() const override { return front_->shadowsTerminator() || back_->shadowsTerminator(); }
 
  private:
   BsdfPtr front_;

@@ -11,6 +11,7 @@
 #include "materials/lobe_on_diffuse.h"
 #include "materials/microfacet.h"
 #include "materials/models.h"
+#include "materials/reflectance.h"
 
 namespace lobe {
 namespace {
@@ -113,8 +114,9 @@ double readAlpha(const Parameters& parameters, std::string_view name) {
 BsdfPtr makeWard(const Parameters& parameters) {
   const Variant variant = readVariant(parameters);
   auto lobe = std::make_shared<WardLobe>(variant, readAlpha(parameters, "alpha_u"), readAlpha(parameters, "alpha_v"));
-  return std::make_shared<LobeOnDiffuse>(std::move(lobe), parameters.texture("specular_reflectance", grey(0.2f)),
-                                         parameters.texture("diffuse_reflectance", grey(0.5f)));
+  auto [specular, diffuse] =
+      readReflectances(parameters, {"specular_reflectance", grey(0.2f)}, {"diffuse_reflectance", grey(0.5f)});
+  return std::make_shared<LobeOnDiffuse>(std::move(lobe), std::move(specular), std::move(diffuse));
 }
 
 }  // namespace lobe

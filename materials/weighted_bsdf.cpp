@@ -147,12 +147,16 @@ bool WeightedBsdf::transmits() const {
   return std::ranges::any_of(parts_, [](const BsdfPtr& part) { return part->transmits(); });
 }
 
-Vec3 WeightedBsdf::perturbedNormal(const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const {
+Vec3 WeightedBsdf::perturbedNormal(const Vec3& wo, const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const {
   const PartWeights all = weights(uv);
   Vec3 normal = Vec3::Zero();
   for (std::size_t i = 0; i < parts_.size(); ++i)
-    if (all[i] > 0.0f) normal += all[i] * parts_[i]->perturbedNormal(uv, dpdu, dpdv);
+    if (all[i] > 0.0f) normal += all[i] * parts_[i]->perturbedNormal(wo, uv, dpdu, dpdv);
   return normal.z() > 0.0f ? Vec3(normal.normalized()) : Vec3::UnitZ();
+}
+
+bool WeightedBsdf::shadowsTerminator() const {
+  return std::ranges::any_of(parts_, [](const BsdfPtr& part) { return part->shadowsTerminator(); });
 }
 
 }  // namespace lobe

@@ -32,10 +32,12 @@ class WeightedBsdf : public Bsdf {
   LobeMixture mixture(const Vec3& wo, const Vec2& uv) const final;
   Rgb albedo(const Vec3& wo, const Vec2& uv) const final;
   bool transmits() const final;
-  Vec3 perturbedNormal(const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const final;
+  Vec3 perturbedNormal(const Vec3& wo, const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const final;
+  bool shadowsTerminator() const final;
 
  private:
-  /// At least 0 each, with a sum above 0 and at most 1.
+  /// At least 0 each, with a sum above 0. A sum above 1 is for dark parts: the whole may then reflect no more than it
+  /// receives all the same.
   virtual PartWeights weights(const Vec2& uv) const = 0;
 
   /// Weights of the parts' smooth parts and of their delta parts, as the sampler chooses.

@@ -23,13 +23,17 @@ std::uint64_t fingerprintOf(const std::string& type, const Parameters& parameter
   return hash.value();
 }
 
-/// What Mitsuba 3 changed: a metal that is not named is a perfect mirror (η 0, k 1) rather than copper, and the opacity
-/// of a mask is a number rather than a colour.
-void setDefaultsOfToday(const std::string& type, Parameters& parameters) {
-  if ((type == "conductor" || type == "roughconductor") && !parameters.has("material"))
-    parameters.set("material", std::string("none"));
+/// What models leave to the version of the file. Mitsuba 0.6 keeps reflectances from exceeding 1. From 2 on a metal
+/// that is not named is a perfect mirror (η 0, k 1) rather than copper, and the opacity of a mask is a number rather
+/// than a colour. From 3 (3.7) on mapped normals face the viewer and shadow their terminator.
+void setDefaults(const std::string& type, int version, Parameters& parameters) {
+  if (version < 2) return parameters.setDefault("ensure_energy_conservation", true);
+  if (type == "conductor" || type == "roughconductor") parameters.setDefault("material", std::string("none"));
   if (type == "mask" && parameters.varies("opacity"))
     parameters.set("opacity", numbersOf(parameters.texture("opacity", grey(1.0f))), parameters.location("opacity"));
+  if (version < 3 || (type != "bumpmap" && type != "normalmap")) return;
+  parameters.setDefault("flip_invalid_normals", true);
+  parameters.setDefault("use_shadowing_function", true);
 }
 
 bool namesMeasurement(pugi::xml_node node) {
@@ -92,7 +96,7 @@ MaterialReader::Made MaterialReader::make(pugi::xml_node node) {
     return true;
   };
   Parameters parameters = readParameters(context_, node, "texture, bsdf, ref", onChild);
-  if (context_.file.isOfToday()) setDefaultsOfToday(type, parameters);
+  setDefaults(type, context_.file.majorVersion(), parameters);
   if (namesMeasurement(node) && !resolveFile(node, parameters)) return makeDiffuseOf(0.5f);
   const BsdfPtr bsdf = makeFrom(context_, node, parameters, [&](const Parameters& p) { return makeBsdf(type, p); });
   return {bsdf, fingerprintOf(type, parameters, children, *bsdf)};

@@ -27,7 +27,6 @@ constexpr std::pair<std::string_view, std::string_view> kWithoutEffect[] = {
     {"texture \"bitmap\"", "accel, cache, format, max_anisotropy"},
     {"emitter \"constant\"", "to_world"},
     {"emitter \"envmap\"", "cache, mis_compensation"},
-    {"bsdf \"normalmap\"", "flip_invalid_normals, use_shadowing_function"},
     {"film",
      "attach_log, banner, burn, channel_names, component_format, compression, digits, exposure, file_format, filename, "
      "gamma, has_alpha, high_quality_edges, key, pixel_format, sample_border, tonemap_method, variable"},

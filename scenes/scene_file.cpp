@@ -328,8 +328,8 @@ std::filesystem::path SceneFile::resolve(const std::string& name, std::ptrdiff_t
   return folders.back() / name;
 }
 
-bool SceneFile::isOfToday() const {
-  return std::strtol(scene_.attribute("version").value(), nullptr, 10) >= 2;
+int SceneFile::majorVersion() const {
+  return static_cast<int>(std::strtol(scene_.attribute("version").value(), nullptr, 10));
 }
 
 pugi::xml_node SceneFile::byId(const std::string& id) const {

@@ -34,7 +34,9 @@ class SceneFile {
   pugi::xml_node scene() const { return scene_; }
 
   /// Written for Mitsuba 3 (or 2), by the scene's version; some defaults differ. Without a version it is an older one.
-  bool isOfToday() const;
+  bool isOfToday() const { return majorVersion() >= 2; }
+  /// The number before the first dot of the scene's version; 0 without one.
+  int majorVersion() const;
 
   /// Whether an attribute of the element still has a $name, which is a fault that has been found already.
   static bool hasUndefinedName(pugi::xml_node node);

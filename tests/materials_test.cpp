@@ -22,6 +22,7 @@ class Waves final : public Texture {
   }
   Rgb mean() const override { return Rgb::Zero(); }
   TextureRange range() const override { return {-0.08f, 0.08f}; }
+  Rgb largest() const override { return grey(0.08f); }
   std::uint64_t fingerprint() const override { return 0; }
 };
 
@@ -238,19 +239,20 @@ TEST_CASE("materials: bump normals are those of the displaced surface") {
       const Vec3 du = dpdu + Vec3::UnitZ() * 2.0f * 0.2f * std::cos(4.0f * uv.x());
       const Vec3 dv = dpdv - Vec3::UnitZ() * 2.0f * 0.09f * std::sin(3.0f * uv.y());
       const Vec3 expected = flip * du.cross(dv).normalized();
-      const Vec3 n = bump->perturbedNormal(uv, dpdu, dpdv);
+      const Vec3 n = bump->perturbedNormal(Vec3::UnitZ(), uv, dpdu, dpdv);
       CHECK((n - expected).norm() < 2e-3f);
       CHECK(n.norm() == Approx(1.0f).margin(1e-5));
       CHECK(n.z() > 0.0f);
     }
   }
   const BsdfPtr flat = bsdfOf("bumpmap", {{"map", constantTexture(grey(0.4f))}}, {bsdfOf("diffuse")});
-  CHECK(flat->perturbedNormal(kUv, dpdu, Vec3::UnitY()).isApprox(Vec3::UnitZ()));
-  CHECK(flat->perturbedNormal(kUv, Vec3::Zero(), Vec3::Zero()) == Vec3::UnitZ());
-  CHECK(bsdfOf("diffuse")->perturbedNormal(kUv, dpdu, Vec3::UnitY()) == Vec3::UnitZ());
+  CHECK(flat->perturbedNormal(Vec3::UnitZ(), kUv, dpdu, Vec3::UnitY()).isApprox(Vec3::UnitZ()));
+  CHECK(flat->perturbedNormal(Vec3::UnitZ(), kUv, Vec3::Zero(), Vec3::Zero()) == Vec3::UnitZ());
+  CHECK(bsdfOf("diffuse")->perturbedNormal(Vec3::UnitZ(), kUv, dpdu, Vec3::UnitY()) == Vec3::UnitZ());
   // A mask around a bump passes the bump on.
   const BsdfPtr masked = bsdfOf("mask", {}, {bump});
-  CHECK(masked->perturbedNormal(kUv, dpdu, Vec3::UnitY()) == bump->perturbedNormal(kUv, dpdu, Vec3::UnitY()));
+  CHECK(masked->perturbedNormal(Vec3::UnitZ(), kUv, dpdu, Vec3::UnitY()) ==
+        bump->perturbedNormal(Vec3::UnitZ(), kUv, dpdu, Vec3::UnitY()));
 }
 
 }  // namespace lobe

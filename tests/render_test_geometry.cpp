@@ -263,7 +263,7 @@ namespace {
 class Tilted : public Diffuse {
  public:
   Tilted() : Diffuse(0.5f) {}
-  Vec3 perturbedNormal(const Vec2&, const Vec3& dpdu, const Vec3&) const override {
+  Vec3 perturbedNormal(const Vec3&, const Vec2&, const Vec3& dpdu, const Vec3&) const override {
     return Vec3(0.6f * dpdu.normalized() + 0.8f * Vec3::UnitZ());
   }
 };

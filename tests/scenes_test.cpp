@@ -135,7 +135,7 @@ TEST_CASE("scenes: references may come before their target and lead into other e
   CHECK(scene.shapes.at(2).material == 0);
   CHECK((albedoOf(scene, 1) == Rgb(1, 0, 0)).all());
   // The inner one, not the bump map around it.
-  CHECK(scene.materials[0].bsdf->perturbedNormal(Vec2(0.5f, 0.5f), Vec3::UnitX(), Vec3::UnitY()) == kUp);
+  CHECK(scene.materials[0].bsdf->perturbedNormal(kUp, Vec2(0.5f, 0.5f), Vec3::UnitX(), Vec3::UnitY()) == kUp);
 }
 
 TEST_CASE("scenes: a reference in a circle is refused") {

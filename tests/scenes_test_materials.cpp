@@ -80,7 +80,7 @@ TEST_CASE("scenes: normal maps hold plain numbers whatever the file says; other 
     const Scene scene =
         readScene(folder.write("test.xml", sceneOf("<shape type=\"sphere\"><bsdf type=\"normalmap\">" + texture +
                                                    diffuse("0.5") + "</bsdf></shape>" + rest)));
-    return scene.materials.at(0).bsdf->perturbedNormal(Vec2(0.5f, 0.5f), Vec3::UnitX(), Vec3::UnitY());
+    return scene.materials.at(0).bsdf->perturbedNormal(kUp, Vec2(0.5f, 0.5f), Vec3::UnitX(), Vec3::UnitY());
   };
   const std::string scale = "<rgb name=\"scale\" value=\"0.625 0.625 1\"/>";  // 0.5, 0.5, 0.8: straight up
   const auto scaled = [&](const std::string& bitmap) {
@@ -127,7 +127,8 @@ TEST_CASE("scenes: phong, ward and roughdiffuse as Mitsuba 0.6 spells them") {
   const std::string fault = faultOf("<bsdf type=\"phong\">\n" + number("alpha", "0.1") + "</bsdf>");
   INFO(fault);
   CHECK(fault.starts_with("test.xml:3:1: "));
-  CHECK(fault.find("diffuse_reflectance, exponent, specular_reflectance") != std::string::npos);
+  CHECK(fault.find("diffuse_reflectance, ensure_energy_conservation, exponent, specular_reflectance") !=
+        std::string::npos);
 }
 
 TEST_CASE("scenes: measured materials are read from beside the scene, and only where something is made of them") {

@@ -126,7 +126,7 @@ class Survey {
     const float choice = rng_.uniform();
     switch (strategy) {
       case 0:
-        return direction(hit_.bsdf->sample(hit_.wo, hit_.uv, choice, rng_.uniform2()));
+        return direction(sampleBsdf(hit_, choice, rng_.uniform2()));
       case 1:
         return direction(guided_.sample(rng_, statistics_));
       case 2:
@@ -150,7 +150,7 @@ class Survey {
   void look(const Vec3& local, bool even) {
     const Vec3 world = hit_.frame.toWorld(local).normalized();
     if (!sidesAgree(hit_, world, local)) return;
-    const Rgb f = hit_.bsdf->eval(hit_.wo, local, hit_.uv) * std::abs(local.z());
+    const Rgb f = evalBsdf(hit_, local) * std::abs(local.z());
     if (!(f.maxCoeff() > 0)) return;
     const Receiver receiver{hit_, std::copysign(1.0f, hit_.normal.dot(world)) * hit_.normal};
     const Ray ray = spawnRay(hit_, world);

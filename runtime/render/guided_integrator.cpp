@@ -111,7 +111,7 @@ std::optional<BsdfSample> GuidedSampler::Vertex::sample(Rng& rng, PathStatistics
   statistics.count(asCounted(strategy));
   statistics.count(decision_);
   if (strategy == Strategy::bsdf) {
-    std::optional<BsdfSample> sample = hit_.bsdf->sample(hit_.wo, hit_.uv, choice, u);
+    std::optional<BsdfSample> sample = sampleBsdf(hit_, choice, u);
     if (sample && density_)
       sample->pdf = density_->bsdfShare() * sample->pdf + density_->guidedPdf(toGuide(sample->wi));
     return sample;
@@ -119,7 +119,7 @@ std::optional<BsdfSample> GuidedSampler::Vertex::sample(Rng& rng, PathStatistics
   const std::optional<Vec3> guide = density_->sample(strategy, choice, u);
   if (!guide) return std::nullopt;
   const Vec3 wi = axes_.transpose() * *guide;
-  const Rgb f = hit_.bsdf->eval(hit_.wo, wi, hit_.uv);
+  const Rgb f = evalBsdf(hit_, wi);
   if (!(f.maxCoeff() > 0)) return std::nullopt;
   return BsdfSample{wi, f, density_->bsdfShare() * hit_.bsdf->pdf(hit_.wo, wi, hit_.uv) + density_->guidedPdf(*guide)};
 }

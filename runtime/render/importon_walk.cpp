@@ -103,8 +103,7 @@ void ImportonWalk::addDirectLight(const SurfaceHit& hit, const GuidedSampler::Ve
   if (!light) return;
   const Vec3 wi = hit.frame.toLocal(light->wi);
   if (!sidesAgree(hit, light->wi, wi)) return;
-  const Rgb value =
-      flight_.weight * hit.bsdf->eval(hit.wo, wi, hit.uv) * light->radiance * (std::abs(wi.z()) / light->pdf);
+  const Rgb value = flight_.weight * evalBsdf(hit, wi) * light->radiance * (std::abs(wi.z()) / light->pdf);
   if (!usable(luminance(value))) return;
   const float weight = light->delta ? 1.0f : misWeight(light->pdf, smoothShare * vertex.pdf(wi));
   if (!light->source && !light->delta)

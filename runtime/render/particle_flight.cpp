@@ -4,7 +4,7 @@ namespace lobe {
 namespace {
 
 std::optional<Scattered> scatterDelta(const SurfaceHit& hit, float share, float fluxScale(float), Rng& rng) {
-  const std::optional<DeltaSample> sample = hit.bsdf->sampleDelta(hit.wo, hit.uv, rng.uniform());
+  const std::optional<DeltaSample> sample = sampleDelta(hit, rng.uniform());
   if (!sample) return std::nullopt;
   return Scattered{sample->wi, {}, sample->weight * (fluxScale(sample->eta) / share), 0};
 }

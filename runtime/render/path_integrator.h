@@ -13,7 +13,7 @@ struct BsdfSampler {
     std::optional<BsdfSample> sample(Rng& rng, PathStatistics& statistics) const {
       statistics.count(SamplingStrategy::bsdf);
       const float choice = rng.uniform();
-      return hit_.bsdf->sample(hit_.wo, hit_.uv, choice, rng.uniform2());
+      return sampleBsdf(hit_, choice, rng.uniform2());
     }
     float pdf(const Vec3& wi) const { return hit_.bsdf->pdf(hit_.wo, wi, hit_.uv); }
 

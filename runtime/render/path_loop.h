@@ -189,7 +189,7 @@ class PathLoop {
     if (!light) return;
     const Vec3 wi = hit.frame.toLocal(light->wi);
     if (!sidesAgree(hit, light->wi, wi)) return;
-    const Rgb value = hit.bsdf->eval(hit.wo, wi, hit.uv) * light->radiance;
+    const Rgb value = evalBsdf(hit, wi) * light->radiance;
     if (!(value.maxCoeff() > 0.0f)) return;
     ++path.statistics.shadowRays;
     if (!scene_.visible(hit, *light)) return;
@@ -208,7 +208,7 @@ class PathLoop {
 
   bool scatterDelta(Path& path, const SurfaceHit& hit, float share) const {
     path.statistics.count(SamplingStrategy::delta);
-    const std::optional<DeltaSample> sample = hit.bsdf->sampleDelta(hit.wo, hit.uv, path.rng.uniform());
+    const std::optional<DeltaSample> sample = sampleDelta(hit, path.rng.uniform());
     if (!sample) return false;
     path.pdf = 0.0f;
     path.eta2 *= sample->eta * sample->eta;

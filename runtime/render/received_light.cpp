@@ -78,7 +78,7 @@ std::optional<Receiver> firstReceiver(const RenderScene& scene, Ray ray) {
     const std::optional<SurfaceHit> hit = scene.tracer.trace(ray);
     if (!hit || !hit->bsdf) return std::nullopt;
     if (hit->bsdf->deltaProbability(hit->wo, hit->uv) < 1) return receiverOf(*hit);
-    const std::optional<DeltaSample> sample = hit->bsdf->sampleDelta(hit->wo, hit->uv, 0.5f);
+    const std::optional<DeltaSample> sample = sampleDelta(*hit, 0.5f);
     if (!sample) return std::nullopt;
     ray = spawnRay(*hit, hit->frame.toWorld(sample->wi).normalized());
   }

@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "materials/normal_mapping.h"
 #include "materials/sampling.h"
 #include "runtime/render/shape_geometry.h"
 
@@ -142,14 +143,29 @@ Vec3 facing(const Vec3& normal, const Vec3& side) {
   return normal.dot(side) < 0.0f ? Vec3(-normal) : normal;
 }
 
-/// unit: of the lengths that a BSDF knows, such as the height of bumps, in those of the scene.
-Frame shadingFrame(const Bsdf* bsdf, const Resolved& r, float unit) {
+/// Fills in the frame and what follows from how it is mapped; hit.bsdf and hit.woWorld are there already. unit: of the
+/// lengths that a BSDF knows, such as the height of bumps, in those of the scene.
+void setFrame(const Resolved& r, float unit, SurfaceHit& hit) {
   const Frame frame = Frame::fromTangent(facing(r.shadingNormal, r.point.normal), r.derivatives.dpdu);
-  if (!bsdf) return frame;
-  const Vec3 local = bsdf->perturbedNormal(r.point.uv, frame.toLocal(r.derivatives.dpdu / unit),
-                                           frame.toLocal(r.derivatives.dpdv / unit));
-  if (local == Vec3::UnitZ() || !local.allFinite()) return frame;
-  return Frame::fromTangent(facing(frame.toWorld(local).normalized(), r.point.normal), r.derivatives.dpdu);
+  hit.frame = frame;
+  hit.unmapped = Vec3::UnitZ();
+  hit.terminatorRoughness2 = 0.0f;
+  if (!hit.bsdf) return;
+  const Vec3 local =
+      hit.bsdf->perturbedNormal(frame.toLocal(hit.woWorld), r.point.uv, frame.toLocal(r.derivatives.dpdu / unit),
+                                frame.toLocal(r.derivatives.dpdv / unit));
+  if (local == Vec3::UnitZ() || !local.allFinite()) return;
+  hit.frame = Frame::fromTangent(facing(frame.toWorld(local).normalized(), r.point.normal), r.derivatives.dpdu);
+  hit.unmapped = hit.frame.toLocal(frame.n);
+  if (hit.bsdf->shadowsTerminator()) hit.terminatorRoughness2 = terminatorRoughness2(hit.unmapped.z());
+}
+
+/// Smith's term of GGX facets on the unmapped surface.
+float terminatorShadowing(const SurfaceHit& hit, const Vec3& wi) {
+  if (hit.terminatorRoughness2 <= 0.0f) return 1.0f;
+  const float cosine = hit.unmapped.dot(wi);
+  const float cosine2 = std::min(1.0f, cosine * cosine);
+  return 2.0f / (1.0f + std::sqrt(1.0f + hit.terminatorRoughness2 * (1.0f - cosine2) / cosine2));
 }
 
 }  // namespace
@@ -208,13 +224,29 @@ SurfaceHit makeSurfaceHit(const Scene& scene, const Ray& ray, const Hit& hit) {
   static_cast<SurfacePoint&>(result) = r.point;
   result.bsdf = shape.material < 0 ? nullptr : scene.materials[shape.material].bsdf.get();
   result.emitter = shape.emitter ? &*shape.emitter : nullptr;
-  result.frame = shadingFrame(result.bsdf, r, scene.scale);
   result.woWorld = -ray.direction;
+  setFrame(r, scene.scale, result);
   result.wo = result.frame.toLocal(result.woWorld);
   result.distance = hit.t;
   result.shape = static_cast<int>(hit.shape);
   result.material = shape.material;
   return result;
+}
+
+Rgb evalBsdf(const SurfaceHit& hit, const Vec3& wi) {
+  return hit.bsdf->eval(hit.wo, wi, hit.uv) * terminatorShadowing(hit, wi);
+}
+
+std::optional<BsdfSample> sampleBsdf(const SurfaceHit& hit, float choice, const Vec2& u) {
+  std::optional<BsdfSample> sample = hit.bsdf->sample(hit.wo, hit.uv, choice, u);
+  if (sample) sample->f *= terminatorShadowing(hit, sample->wi);
+  return sample;
+}
+
+std::optional<DeltaSample> sampleDelta(const SurfaceHit& hit, float choice) {
+  std::optional<DeltaSample> sample = hit.bsdf->sampleDelta(hit.wo, hit.uv, choice);
+  if (sample) sample->weight *= terminatorShadowing(hit, sample->wi);
+  return sample;
 }
 
 Rgb emittedRadiance(const SurfaceHit& hit) {

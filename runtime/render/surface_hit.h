@@ -29,6 +29,8 @@ struct SurfacePoint {
 
 struct SurfaceHit : SurfacePoint {
   Frame frame;                 ///< shading frame after bump mapping; frame.n · normal ≥ 0
+  Vec3 unmapped;               ///< unit, local in frame: the shading normal before bump mapping
+  float terminatorRoughness2;  ///< of the shadowing that bump mapping asks for; 0: none
   Vec3 wo;                     ///< unit, local in frame: where the ray came from
   Vec3 woWorld;                ///< the same in world space
   float distance;              ///< of the hit along its ray
@@ -50,6 +52,12 @@ SurfacePoint pointOnCylinder(const Cylinder& cylinder, float azimuth, float heig
 
 /// Fills in all of a SurfaceHit from what the ray tracer says. The ray's direction is unit.
 SurfaceHit makeSurfaceHit(const Scene& scene, const Ray& ray, const Hit& hit);
+
+/// The BSDF at the hit, as it is to be used in estimates: with the shadowing that bump mapping asks for, which is a
+/// factor on light along wi (local in hit.frame). The hit has a bsdf.
+Rgb evalBsdf(const SurfaceHit& hit, const Vec3& wi);
+std::optional<BsdfSample> sampleBsdf(const SurfaceHit& hit, float choice, const Vec2& u);
+std::optional<DeltaSample> sampleDelta(const SurfaceHit& hit, float choice);
 
 /// The radiance that leaves the point towards where the ray came from by emission: front side only, else black.
 Rgb emittedRadiance(const SurfaceHit& hit);

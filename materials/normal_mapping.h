@@ -1,0 +1,58 @@
+#pragma once
+// Internal to materials/: a model that reflects as another does, and only turns the shading normal.
+
+#include "materials/bsdf.h"
+#include "materials/parameters.h"
+
+namespace lobe {
+
+class NormalMapping : public Bsdf {
+ public:
+  /// What Mitsuba 3.7 does by default, and older versions do not.
+  struct Options {
+    /// Turns a normal that looks away from the viewer half around the unmapped one, so that it faces the viewer.
+    bool flipInvalid = false;
+    bool shadowTerminator = false;
+  };
+  /// From flip_invalid_normals and use_shadowing_function, off by default.
+  static Options readOptions(const Parameters& parameters);
+
+  NormalMapping(BsdfPtr nested, const Options& options) : nested_(std::move(nested)), options_(options) {}
+
+  Rgb eval(const Vec3& wo, const Vec3& wi, const Vec2& uv) const final { return nested_->eval(wo, wi, uv); }
+  std::optional<BsdfSample> sample(const Vec3& wo, const Vec2& uv, float choice, const Vec2& u) const final {
+    return nested_->sample(wo, uv, choice, u);
+  }
+  float pdf(const Vec3& wo, const Vec3& wi, const Vec2& uv) const final { return nested_->pdf(wo, wi, uv); }
+  std::optional<DeltaSample> sampleDelta(const Vec3& wo, const Vec2& uv, float choice) const final {
+    return nested_->sampleDelta(wo, uv, choice);
+  }
+  float deltaProbability(const Vec3& wo, const Vec2& uv) const final { return nested_->deltaProbability(wo, uv); }
+  std::span<const LobePtr> lobes() const final { return nested_->lobes(); }
+  LobeMixture mixture(const Vec3& wo, const Vec2& uv) const final { return nested_->mixture(wo, uv); }
+  Rgb albedo(const Vec3& wo, const Vec2& uv) const final { return nested_->albedo(wo, uv); }
+  bool transmits() const final { return nested_->transmits(); }
+
+  Vec3 perturbedNormal(const Vec3& wo, const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const final;
+  bool shadowsTerminator() const final { return options_.shadowTerminator || nested_->shadowsTerminator(); }
+
+ protected:
+  /// The mapped surface: its unit normal with z > 0, and the derivatives of position along it.
+  struct Tilted {
+    Vec3 normal, dpdu, dpdv;
+  };
+
+ private:
+  /// nullopt: the map does not say, and the surface stays as it is.
+  virtual std::optional<Tilted> tilted(const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const = 0;
+
+  BsdfPtr nested_;
+  Options options_;
+};
+
+/// For the terminator of a mapped normal, whose cosine to the unmapped one is given: the squared GGX roughness of the
+/// facets that stand for the relief, of which Smith's term shadows the unmapped surface (Conty Estevez, Lecocq and
+/// Stein 2019, "A Microfacet-Based Shadowing Function to Solve the Bump Terminator Problem").
+float terminatorRoughness2(float cosine);
+
+}  // namespace lobe
