@@ -49,9 +49,9 @@ struct LobeMixture {
   std::array<LobeTint, kMaxLobes> glossy;
   int glossyCount = 0;
   float constant = 0;  ///< albedo of the constant (diffuse) reflection, luminance
-  /// Share in [0,1] of the smooth part's albedo that goes to the other side of the surface, which nothing above
-  /// describes.
-  float transmittedShare = 0;
+  /// Share in [0,1] of the smooth part's albedo that nothing above describes: what goes to the other side of the
+  /// surface, and what is reflected by lobes that cannot be fitted.
+  float undescribedShare = 0;
 };
 
 class Bsdf {
@@ -100,6 +100,9 @@ class Bsdf {
     (void)wo, (void)uv, (void)dpdu, (void)dpdv;
     return Vec3::UnitZ();
   }
+
+  /// Whether perturbedNormal may be other than UnitZ.
+  virtual bool mapsNormals() const { return false; }
 
   /// Whether light that grazes the surface is dimmed according to how far the mapped normal leans, as
   /// terminatorRoughness2 says. The host does that, since eval only knows the frame after mapping.

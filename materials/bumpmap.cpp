@@ -1,5 +1,7 @@
 // Turns the shading normal as if the surface were displaced along it by a texture.
 
+#include <Eigen/Geometry>
+
 #include "materials/models.h"
 #include "materials/normal_mapping.h"
 

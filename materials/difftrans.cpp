@@ -29,7 +29,7 @@ class DiffuseTransmitter final : public Bsdf {
 
   LobeMixture mixture(const Vec3&, const Vec2&) const override {
     LobeMixture result;
-    result.transmittedShare = 1.0f;
+    result.undescribedShare = 1.0f;
     return result;
   }
 

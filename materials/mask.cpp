@@ -59,6 +59,7 @@ class Mask final : public Bsdf {
   Vec3 perturbedNormal(const Vec3& wo, const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const override {
     return nested_->perturbedNormal(wo, uv, dpdu, dpdv);
   }
+  bool mapsNormals() const override { return nested_->mapsNormals(); }
   bool shadowsTerminator() const override { return nested_->shadowsTerminator(); }
 
  private:

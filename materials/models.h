@@ -7,6 +7,7 @@ namespace lobe {
 
 BsdfPtr makeBlend(const Parameters& parameters);
 BsdfPtr makeBumpMap(const Parameters& parameters);
+BsdfPtr makeCoating(const Parameters& parameters);
 BsdfPtr makeConductor(const Parameters& parameters);
 BsdfPtr makeDielectric(const Parameters& parameters);
 BsdfPtr makeDiffTrans(const Parameters& parameters);
@@ -20,6 +21,8 @@ BsdfPtr makeNull(const Parameters& parameters);
 BsdfPtr makePhong(const Parameters& parameters);
 BsdfPtr makePlastic(const Parameters& parameters);
 BsdfPtr makePrincipled(const Parameters& parameters);
+BsdfPtr makePrincipledThin(const Parameters& parameters);
+BsdfPtr makeRoughCoating(const Parameters& parameters);
 BsdfPtr makeRoughConductor(const Parameters& parameters);
 BsdfPtr makeRoughDielectric(const Parameters& parameters);
 BsdfPtr makeRoughDiffuse(const Parameters& parameters);

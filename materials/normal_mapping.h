@@ -34,6 +34,7 @@ class NormalMapping : public Bsdf {
   bool transmits() const final { return nested_->transmits(); }
 
   Vec3 perturbedNormal(const Vec3& wo, const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const final;
+  bool mapsNormals() const final { return true; }
   bool shadowsTerminator() const final { return options_.shadowTerminator || nested_->shadowsTerminator(); }
 
  protected:

@@ -12,6 +12,7 @@
 #include "materials/fresnel.h"
 #include "materials/models.h"
 #include "materials/principled_diffuse.h"
+#include "materials/principled_parameters.h"
 #include "materials/principled_specular.h"
 #include "materials/reflectance.h"
 #include "materials/sampling.h"
@@ -30,17 +31,6 @@ struct Textures {
 struct Rates {
   float specular, clearcoat, diffuse;
 };
-
-float weightOf(const TexturePtr& texture, const Vec2& uv) {
-  return std::clamp(texture->evalNumber(uv), 0.0f, 1.0f);
-}
-
-/// α of the interface along local x and y.
-Microfacet interfaceOf(float roughness, float anisotropic) {
-  const double square = static_cast<double>(roughness) * roughness;
-  const double aspect = std::sqrt(1.0 - 0.9 * static_cast<double>(anisotropic));
-  return {Microfacet::Kind::ggx, std::max(0.001, square / aspect), std::max(0.001, square * aspect)};
-}
 
 double clearcoatAlpha(float gloss) {
   return std::lerp(0.1, 0.001, static_cast<double>(gloss));
@@ -66,7 +56,7 @@ class Point {
         sheenTint_(weightOf(t.sheenTint, uv)),
         flatness_(weightOf(t.flatness, uv)),
         clearcoat_(front ? 0.25f * weightOf(t.clearcoat, uv) : 0.0f),
-        interface_(interfaceOf(roughness_, weightOf(t.anisotropic, uv))),
+        interface_(principledInterface(roughness_, weightOf(t.anisotropic, uv))),
         coat_(clearcoatAlpha(weightOf(t.clearcoatGloss, uv)), eta),
         eta_(front ? eta : 1.0 / eta),
         front_(front) {
@@ -174,20 +164,15 @@ class Point {
     if (!front_) return grey(transmitting_ * dielectric);
     const auto normal = static_cast<float>((eta_ - 1.0) / (eta_ + 1.0));
     const auto schlicks = [&](const Rgb& f0) -> Rgb { return f0 + (1.0f - f0) * schlickWeight; };
-    return (1.0f - metallic_) * ((1.0f - specTint_) * dielectric + specTint_ * schlicks(hue() * (normal * normal))) +
+    return (1.0f - metallic_) *
+               ((1.0f - specTint_) * dielectric + specTint_ * schlicks(principledHue(base_) * (normal * normal))) +
            metallic_ * schlicks(base_);
   }
 
   Rgb diffuse(const PrincipledDiffuse& terms) const {
-    const Rgb sheenColour = 1.0f - sheenTint_ + sheenTint_ * hue();
+    const Rgb sheenColour = 1.0f - sheenTint_ + sheenTint_ * principledHue(base_);
     return diffuse_ * terms.diffuse(roughness_, flatness_) * base_ +
            sheen_ * (1.0f - metallic_) * terms.sheen * sheenColour;
-  }
-
-  /// The base colour at luminance 1.
-  Rgb hue() const {
-    const float bright = luminance(base_);
-    return bright > 0.0f ? Rgb(base_ / bright) : Rgb(Rgb::Ones());
   }
 
   /// How often the interface is taken as a mirror, given its reflectance at the half vector.
@@ -270,7 +255,7 @@ class Principled final : public Bsdf {
     result.constant = luminance(parts.diffuse);
     const float reflected = luminance(parts.tint * parts.white + parts.diffuse);
     const float transmitted = luminance(parts.transmitted);
-    if (transmitted > 0.0f) result.transmittedShare = transmitted / (reflected + transmitted);
+    if (transmitted > 0.0f) result.undescribedShare = transmitted / (reflected + transmitted);
     return result;
   }
 
@@ -306,7 +291,7 @@ class Principled final : public Bsdf {
 
   static float weightMean(const TexturePtr& texture) { return std::clamp(luminance(texture->mean()), 0.0f, 1.0f); }
   Microfacet meanInterface() const {
-    return interfaceOf(weightMean(textures_.roughness), weightMean(textures_.anisotropic));
+    return principledInterface(weightMean(textures_.roughness), weightMean(textures_.anisotropic));
   }
   double meanAlpha() const { return std::sqrt(meanInterface().alphaU() * meanInterface().alphaV()); }
 
@@ -318,15 +303,6 @@ class Principled final : public Bsdf {
   SpecularTable outside_;
   SpecularTable inside_;
 };
-
-/// A texture of values in [0,1], as far as its mean tells.
-TexturePtr readWeight(const Parameters& parameters, const std::string& name, float fallback) {
-  TexturePtr texture = parameters.texture(name, grey(fallback));
-  const Rgb mean = texture->mean();
-  if (!((mean >= 0.0f).all() && (mean <= 1.0f).all()))
-    throw ParameterError(name, fmt::format("{} must be in [0, 1], not {}", name, mean.maxCoeff()));
-  return texture;
-}
 
 Textures readTextures(const Parameters& parameters) {
   const auto weight = [&](const char* name, float fallback) { return readWeight(parameters, name, fallback); };
@@ -341,13 +317,6 @@ Textures readTextures(const Parameters& parameters) {
           weight("flatness", 0.0f),
           weight("clearcoat", 0.0f),
           weight("clearcoat_gloss", 0.0f)};
-}
-
-float readRate(const Parameters& parameters, const std::string& name) {
-  const double rate = parameters.number(name, 1.0);
-  if (!(rate >= 0.0 && rate <= 1e6))
-    throw ParameterError(name, fmt::format("{} must be at least 0, not {}", name, rate));
-  return static_cast<float>(rate);
 }
 
 /// From eta, or from specular, which stands for it. An interface that is none could not refract.

@@ -18,6 +18,7 @@ struct Entry {
 constexpr std::array kModels = {
     Entry{"blendbsdf", makeBlend},
     Entry{"bumpmap", makeBumpMap},
+    Entry{"coating", makeCoating},
     Entry{"conductor", makeConductor},
     Entry{"dielectric", makeDielectric},
     Entry{"difftrans", makeDiffTrans},
@@ -31,6 +32,8 @@ constexpr std::array kModels = {
     Entry{"phong", makePhong},
     Entry{"plastic", makePlastic},
     Entry{"principled", makePrincipled},
+    Entry{"principledthin", makePrincipledThin},
+    Entry{"roughcoating", makeRoughCoating},
     Entry{"roughconductor", makeRoughConductor},
     Entry{"roughdielectric", makeRoughDielectric},
     Entry{"roughdiffuse", makeRoughDiffuse},

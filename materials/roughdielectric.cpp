@@ -64,7 +64,7 @@ class RoughDielectric final : public Bsdf {
     if (wo.z() == 0.0f) return result;
     const int firstLobe = wo.z() > 0.0f ? 0 : static_cast<int>(roughness_.levels().size());
     addLevels(result, firstLobe, roughness_.at(uv), luminance(reflectance_->eval(uv)));
-    result.transmittedShare = meanShares(wo, uv).probability(false);
+    result.undescribedShare = meanShares(wo, uv).probability(false);
     return result;
   }
 

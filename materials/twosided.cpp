@@ -63,6 +63,7 @@ class TwoSided final : public Bsdf {
     const Vec3 mirrored = back_->perturbedNormal(flipped(wo), uv, flipped(dpdu), flipped(dpdv));
     return {-mirrored.x(), -mirrored.y(), mirrored.z()};
   }
+  bool mapsNormals() const override { return front_->mapsNormals() || back_->mapsNormals(); }
   bool shadowsTerminator() const override { return front_->shadowsTerminator() || back_->shadowsTerminator(); }
 
  private:

@@ -126,9 +126,9 @@ LobeMixture WeightedBsdf::mixture(const Vec3& wo, const Vec2& uv) const {
     // How often the sampler takes the delta part is about its share of the albedo.
     const float albedo = all[i] * luminance(parts_[i]->albedo(wo, uv)) * (1.0f - parts_[i]->deltaProbability(wo, uv));
     albedos += albedo;
-    result.transmittedShare += albedo * part.transmittedShare;
+    result.undescribedShare += albedo * part.undescribedShare;
   }
-  result.transmittedShare = albedos > 0.0f ? std::min(1.0f, result.transmittedShare / albedos) : 0.0f;
+  result.undescribedShare = albedos > 0.0f ? std::min(1.0f, result.undescribedShare / albedos) : 0.0f;
   keepLargest(tints);
   std::ranges::copy(tints, result.glossy.begin());
   result.glossyCount = static_cast<int>(tints.size());
@@ -153,6 +153,10 @@ Vec3 WeightedBsdf::perturbedNormal(const Vec3& wo, const Vec2& uv, const Vec3& d
   for (std::size_t i = 0; i < parts_.size(); ++i)
     if (all[i] > 0.0f) normal += all[i] * parts_[i]->perturbedNormal(wo, uv, dpdu, dpdv);
   return normal.z() > 0.0f ? Vec3(normal.normalized()) : Vec3::UnitZ();
+}
+
+bool WeightedBsdf::mapsNormals() const {
+  return std::ranges::any_of(parts_, [](const BsdfPtr& part) { return part->mapsNormals(); });
 }
 
 bool WeightedBsdf::shadowsTerminator() const {

@@ -33,6 +33,7 @@ class WeightedBsdf : public Bsdf {
   Rgb albedo(const Vec3& wo, const Vec2& uv) const final;
   bool transmits() const final;
   Vec3 perturbedNormal(const Vec3& wo, const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const final;
+  bool mapsNormals() const final;
   bool shadowsTerminator() const final;
 
  private:

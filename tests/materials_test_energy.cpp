@@ -90,6 +90,23 @@ std::vector<Named> smoothModels() {
   models.push_back({"blendbsdf", bsdfOf("blendbsdf", {{"weight", 0.4}}, {models[1].bsdf, back})});
   models.push_back({"mixturebsdf", bsdfOf("mixturebsdf", {{"weights", std::string("0.5 0.2 0.3")}},
                                           {front, models[0].bsdf, models[1].bsdf})});
+  const BsdfPtr bright = bsdfOf("diffuse", {{"reflectance", 0.9}});
+  for (const double alpha : {0.02, 0.3})
+    models.push_back({"coated " + std::to_string(alpha),
+                      bsdfOf("roughcoating", {{"alpha", alpha}, {"distribution", std::string("ggx")}}, {bright})});
+  models.push_back(
+      {"dyed coating", bsdfOf("coating", {{"sigma_a", Rgb(0.1f, 0.5f, 1.0f)}, {"thickness", 0.4}}, {bright})});
+  models.push_back({"coated on both sides", bsdfOf("coating", {{"int_ior", 1.8}}, {bsdfOf("twosided", {}, {bright})})});
+  models.push_back({"coated plastic", bsdfOf("coating", {}, {bsdfOf("plastic")})});
+  for (const double roughness : {0.1, 0.6})
+    models.push_back({"principledthin " + std::to_string(roughness),
+                      bsdfOf("principledthin", {{"roughness", roughness},
+                                                {"base_color", Rgb(0.9f, 0.5f, 0.2f)},
+                                                {"spec_trans", 0.6},
+                                                {"spec_tint", 0.3},
+                                                {"diff_trans", 0.7},
+                                                {"sheen", 0.2}}),
+                      kPrincipledAlbedo});
   return models;
 }
 

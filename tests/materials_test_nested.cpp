@@ -27,6 +27,16 @@ class Halves final : public Texture {
   Rgb left_, right_;
 };
 
+/// A height of u, for bumps.
+class Ramp final : public Texture {
+ public:
+  Rgb eval(const Vec2& uv) const override { return grey(uv.x()); }
+  Rgb mean() const override { return grey(0.5f); }
+  TextureRange range() const override { return {0.0f, 1.0f}; }
+  Rgb largest() const override { return grey(1.0f); }
+  std::uint64_t fingerprint() const override { return 0; }
+};
+
 BsdfPtr blendOf(double weight, const BsdfPtr& first, const BsdfPtr& second) {
   return bsdfOf("blendbsdf", {{"weight", weight}}, {first, second});
 }
@@ -71,7 +81,7 @@ void checkSame(const Bsdf& a, const Bsdf& b, const Vec2& uv) {
     if (d) CHECK((d->wi == e->wi && (d->weight == e->weight).all() && d->eta == e->eta));
     CHECK(a.mixture(wo, uv).constant == b.mixture(wo, uv).constant);
     CHECK(a.mixture(wo, uv).glossyCount == b.mixture(wo, uv).glossyCount);
-    CHECK(a.mixture(wo, uv).transmittedShare == Approx(b.mixture(wo, uv).transmittedShare));
+    CHECK(a.mixture(wo, uv).undescribedShare == Approx(b.mixture(wo, uv).undescribedShare));
   }
 }
 
@@ -100,7 +110,7 @@ TEST_CASE("materials: a diffuse transmitter gives its transmittance to the other
   for (const Vec3& wo : {kAbove, kBelow}) {
     CHECK(paper->eval(wo, wo, kUv).maxCoeff() == 0.0f);
     CHECK(paper->pdf(wo, wo, kUv) == 0.0f);
-    CHECK(paper->mixture(wo, kUv).transmittedShare == 1.0f);
+    CHECK(paper->mixture(wo, kUv).undescribedShare == 1.0f);
     CHECK(paper->mixture(wo, kUv).constant == 0.0f);
     // Sampled by the cosine, every sample carries the albedo.
     for (const float u : {0.01f, 0.5f, 0.99f}) {
@@ -187,9 +197,9 @@ TEST_CASE("materials: of many lobes a mixture names the strongest") {
 TEST_CASE("materials: the share of light through a blend is by albedo") {
   const BsdfPtr blend =
       blendOf(0.25, bsdfOf("diffuse", {{"reflectance", 0.2}}), bsdfOf("difftrans", {{"transmittance", 0.6}}));
-  CHECK(blend->mixture(kAbove, kUv).transmittedShare == Approx(0.5f));
+  CHECK(blend->mixture(kAbove, kUv).undescribedShare == Approx(0.5f));
   CHECK(blend->mixture(kAbove, kUv).constant == Approx(0.15f));
-  CHECK(blend->mixture(kBelow, kUv).transmittedShare == Approx(1.0f));
+  CHECK(blend->mixture(kBelow, kUv).undescribedShare == Approx(1.0f));
 }
 
 TEST_CASE("materials: weights above 1 in sum are scaled down to it, others are left") {
@@ -232,6 +242,57 @@ TEST_CASE("materials: a normal map turns the normal in the frame of the tangent 
   const BsdfPtr inner = bsdfOf("normalmap", {{"", constantTexture(Rgb(0.8f, 0.5f, 0.9f))}}, {diffuse});
   const Vec3 twice = mapped(Rgb(0.8f, 0.5f, 0.9f), Vec3::UnitX(), inner);
   CHECK(twice.isApprox(Vec3(0.96f, 0.0f, 0.28f), 1e-5f));
+}
+
+TEST_CASE("materials: mapped normals that look away from the viewer are turned round where that is asked for") {
+  const Rgb leaning(0.8f, 0.5f, 0.9f);  // (0.6, 0, 0.8)
+  const auto normal = [&](bool flips, const Vec3& wo) {
+    const BsdfPtr map =
+        bsdfOf("normalmap", {{"", constantTexture(leaning)}, {"flip_invalid_normals", flips}}, {bsdfOf("diffuse")});
+    return map->perturbedNormal(wo, kUv, Vec3::UnitX(), Vec3::UnitY());
+  };
+  const Vec3 facing = directionAt(70.0);
+  const Vec3 averted = directionAt(70.0, 180.0);
+  CHECK(normal(true, facing).isApprox(Vec3(0.6f, 0.0f, 0.8f), 1e-5f));
+  CHECK(normal(true, averted).isApprox(Vec3(-0.6f, 0.0f, 0.8f), 1e-5f));
+  CHECK(normal(false, averted).isApprox(Vec3(0.6f, 0.0f, 0.8f), 1e-5f));
+  // From below, the side that counts is the other one.
+  CHECK(normal(true, -facing).isApprox(Vec3(0.6f, 0.0f, 0.8f), 1e-5f));
+  CHECK(normal(true, -averted).isApprox(Vec3(-0.6f, 0.0f, 0.8f), 1e-5f));
+  const auto slope = std::make_shared<Ramp>();
+  const BsdfPtr bump =
+      bsdfOf("bumpmap", {{"", TexturePtr(slope)}, {"flip_invalid_normals", true}}, {bsdfOf("diffuse")});
+  const Vec3 n = Vec3(-1.0f, 0.0f, 1.0f).normalized();
+  CHECK(bump->perturbedNormal(averted, kUv, Vec3::UnitX(), Vec3::UnitY()).isApprox(n, 1e-3f));
+  CHECK(bump->perturbedNormal(facing, kUv, Vec3::UnitX(), Vec3::UnitY()).isApprox(Vec3(-n.x(), 0.0f, n.z()), 1e-3f));
+}
+
+TEST_CASE("materials: the back of a two-sided map is the mirror image of its front") {
+  const BsdfPtr map = bsdfOf("normalmap", {{"", constantTexture(Rgb(0.8f, 0.5f, 0.9f))}}, {bsdfOf("diffuse")});
+  const BsdfPtr both = bsdfOf("twosided", {}, {map});
+  const auto normal = [&](const Vec3& wo) { return both->perturbedNormal(wo, kUv, Vec3::UnitX(), Vec3::UnitY()); };
+  CHECK(normal(kAbove).isApprox(Vec3(0.6f, 0.0f, 0.8f), 1e-5f));
+  // The axis (0.6, 0, −0.8) on the front side.
+  CHECK(normal(kBelow).isApprox(Vec3(-0.6f, 0.0f, 0.8f), 1e-5f));
+}
+
+TEST_CASE("materials: shadowing at the terminator is asked for through all models") {
+  const auto mapped = [](bool shadows) {
+    return bsdfOf("normalmap", {{"", constantTexture(Rgb(0.8f, 0.5f, 0.9f))}, {"use_shadowing_function", shadows}},
+                  {bsdfOf("diffuse")});
+  };
+  for (const bool shadows : {false, true}) {
+    const BsdfPtr map = mapped(shadows);
+    for (const BsdfPtr& bsdf :
+         {map, bsdfOf("twosided", {}, {map}), bsdfOf("mask", {}, {map}), blendOf(0.5, bsdfOf("diffuse"), map),
+          bsdfOf("bumpmap", {{"", constantTexture(grey(1.0f))}}, {map}), bsdfOf("coating", {}, {map}),
+          bsdfOf("roughcoating", {}, {map})}) {
+      CHECK(bsdf->shadowsTerminator() == shadows);
+      CHECK(bsdf->mapsNormals());
+    }
+  }
+  CHECK_FALSE(bsdfOf("diffuse")->shadowsTerminator());
+  CHECK_FALSE(bsdfOf("coating", {}, {bsdfOf("diffuse")})->mapsNormals());
 }
 
 TEST_CASE("materials: normals mapped in a blend are averaged by weight") {

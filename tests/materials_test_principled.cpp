@@ -133,7 +133,7 @@ TEST_CASE("materials: principled glass keeps its energy, and its two ways differ
     CHECK(energy.value() <= 1.0 + 4.0 * energy.error());
     CHECK(energy.value() > 0.98);
     CHECK(luminance(glass->albedo(wo, kUv)) == Approx(1.0).margin(0.02));
-    CHECK(glass->mixture(wo, kUv).transmittedShare == Approx(1.0 - reflected.value()).margin(0.02));
+    CHECK(glass->mixture(wo, kUv).undescribedShare == Approx(1.0 - reflected.value()).margin(0.02));
   }
   CHECK(principled({{"spec_trans", 1.0}, {"specular", 0.0}})->transmits());
 }
@@ -148,7 +148,7 @@ TEST_CASE("materials: an opaque principled surface is black from behind") {
   CHECK_FALSE(bsdf->sample(below, kUv, 0.5f, Vec2(0.5f, 0.5f)));
   CHECK(bsdf->mixture(below, kUv).glossyCount == 0);
   CHECK(bsdf->albedo(below, kUv).maxCoeff() == 0.0f);
-  CHECK(bsdf->mixture(-below, kUv).transmittedShare == 0.0f);
+  CHECK(bsdf->mixture(-below, kUv).undescribedShare == 0.0f);
 }
 
 TEST_CASE("materials: all of principled is finite at the edges of its parameters") {
@@ -180,7 +180,7 @@ TEST_CASE("materials: all of principled is finite at the edges of its parameters
           const auto s = bsdf->sample(wo, kUv, rng.uniform(), rng.uniform2());
           bad += s && !(s->f.allFinite() && (s->f >= 0.0f).all() && s->pdf > 0.0f && std::isfinite(s->pdf));
           const LobeMixture mixture = bsdf->mixture(wo, kUv);
-          bad += !(mixture.constant >= 0.0f && mixture.transmittedShare >= 0.0f && mixture.transmittedShare <= 1.0f &&
+          bad += !(mixture.constant >= 0.0f && mixture.undescribedShare >= 0.0f && mixture.undescribedShare <= 1.0f &&
                    bsdf->albedo(wo, kUv).allFinite());
         }
         INFO(roughness << " " << all << " " << eta);

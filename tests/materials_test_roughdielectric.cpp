@@ -95,7 +95,7 @@ TEST_CASE("materials: a lossless rough dielectric keeps what single scattering k
         CHECK(energy.total.value() > (alpha < 0.01 ? 0.995 : alpha < 0.2 ? 0.84 : 0.58));
         const LobeMixture mixture = glass->mixture(wo, kUv);
         // A table for guidance: from within, total reflection is a kink that it rounds off.
-        CHECK(mixture.transmittedShare ==
+        CHECK(mixture.undescribedShare ==
               Approx(energy.refracted.value()).margin(4.0 * energy.refracted.error() + 0.06));
         Mean modelled;
         Rng rng(32);
@@ -165,7 +165,7 @@ TEST_CASE("materials: rough dielectrics without effect, or seen edge on, are bla
   const Vec3 above = directionAt(30.0), below = directionAt(160.0);
   CHECK_FALSE(black->sample(above, kUv, 0.5f, Vec2(0.5f, 0.5f)));
   CHECK(black->pdf(above, below, kUv) == 0.0f);
-  CHECK(black->mixture(above, kUv).transmittedShare == 0.0f);
+  CHECK(black->mixture(above, kUv).undescribedShare == 0.0f);
   for (const Vec3& w : {above, below}) {
     CHECK(glass->eval(w, Vec3::UnitX(), kUv).maxCoeff() == 0.0f);
     CHECK(glass->eval(Vec3::UnitX(), w, kUv).maxCoeff() == 0.0f);
@@ -176,7 +176,7 @@ TEST_CASE("materials: rough dielectrics without effect, or seen edge on, are bla
   // No normal bends light along the surface's other side back up to where it came from.
   CHECK(glass->eval(directionAt(60.0), directionAt(91.0, 0.0), kUv).maxCoeff() == 0.0f);
   // Past the critical angle all is reflected, and only one lobe takes part on each side.
-  CHECK(roughGlass("ggx", 0.001, 0.001, 1.5)->mixture(directionAt(125.0), kUv).transmittedShare < 0.01f);
+  CHECK(roughGlass("ggx", 0.001, 0.001, 1.5)->mixture(directionAt(125.0), kUv).undescribedShare < 0.01f);
   CHECK(glass->mixture(below, kUv).glossy[0].lobe == 1);
   CHECK(glass->lobes()[0]->key() != glass->lobes()[1]->key());
 }

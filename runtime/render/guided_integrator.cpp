@@ -71,9 +71,10 @@ GuidedSampler::Vertex::Vertex(const GuidedSampler& sampler, const SurfaceHit& hi
   const float side = sideOf(hit);
   axes_ = guideAxes(hit, *record_, side);
   const LobeMixture mixture = hit.bsdf->mixture(hit.wo, hit.uv);
+  described_ = mixture.undescribedShare <= 0;
   product_ = sampler.caches_ != nullptr;
   if (product_) collectReflectance(sampler, hit, mixture, side);
-  covered_ = (1 - mixture.transmittedShare) * coveredShare(reflectance_);
+  covered_ = (1 - mixture.undescribedShare) * coveredShare(reflectance_);
   decision_ = decide();
   const bool halves = !product_ || decision_ == GuidingDecision::undersampled;
   if (decision_ != GuidingDecision::narrow && decision_ != GuidingDecision::even)
@@ -140,8 +141,8 @@ std::optional<ShareSample> GuidedSampler::Vertex::shareSample(const Vec3& wi) co
 }
 
 std::optional<float> GuidedSampler::Vertex::reflectedRadiance() const {
-  // Nothing is known of light that comes through the surface.
-  if (!record_ || !(record_->irradiance > 0) || hit_.bsdf->transmits()) return std::nullopt;
+  // Nothing is known of light that comes through the surface, nor of what lobes without a fit reflect.
+  if (!record_ || !(record_->irradiance > 0) || hit_.bsdf->transmits() || !described_) return std::nullopt;
   const float diffuse = product_ ? reflectance_.uncoveredAlbedo : luminance(hit_.bsdf->albedo(hit_.wo, hit_.uv));
   if (!product_) return record_->irradiance * diffuse * kInvPi;
   const bool shaped = decision_ == GuidingDecision::product || decision_ == GuidingDecision::illumination;

@@ -44,6 +44,7 @@ class GuidedSampler {
     const SurfaceHit& hit_;
     const PackedRecord* record_;  // nullptr: none serves the point, and density_ is empty
     Eigen::Matrix3f axes_;        // from the shading frame to the guide's
+    bool described_ = true;       // whether lobes and constant are all of the smooth reflection
     float covered_ = 0;           // share of samples that mixtures may draw
     GuidingDecision decision_ = GuidingDecision::noRecord;
     bool product_ = false;

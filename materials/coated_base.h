@@ -1,0 +1,70 @@
+#pragma once
+// Internal to materials/: what lies under a dielectric coating, as it is seen from outside.
+
+#include <array>
+
+#include "materials/bsdf.h"
+#include "materials/texture.h"
+
+namespace lobe {
+
+/// A model seen through an absorbing layer with a flat dielectric interface on top (Weidlich and Wilkie 2007,
+/// "Arbitrarily Layered Micro-Facet Surfaces"): directions are bent at the interface. Light that the interface throws
+/// back from within is lost. How much the interface lets through is left to the owner, who multiplies with it for both
+/// directions. Directions are outside; either side of the surface is coated.
+class CoatedBase {
+ public:
+  /// eta: index of the layer over that outside. depth: absorption coefficient times thickness.
+  CoatedBase(BsdfPtr nested, double eta, TexturePtr depth);
+
+  Rgb eval(const Vec3& wo, const Vec3& wi, const Vec2& uv) const;
+  /// The nested model's sample where it gets out of the layer, with its value and density from eval and pdf.
+  std::optional<BsdfSample> sample(const Vec3& wo, const Vec2& uv, float choice, const Vec2& u) const;
+  float pdf(const Vec3& wo, const Vec3& wi, const Vec2& uv) const;
+  std::optional<DeltaSample> sampleDelta(const Vec3& wo, const Vec2& uv, float choice) const;
+
+  /// The directional albedo by parts, approximately.
+  struct Albedo {
+    Rgb constant = Rgb::Zero();     ///< of what is diffuse reflection inside
+    Rgb directional = Rgb::Zero();  ///< of other smooth parts, taken as narrow
+    Rgb delta = Rgb::Zero();
+    Rgb sum() const { return constant + directional + delta; }
+  };
+  /// transmittance(|cosθ|): of the interface, from outside. Included for both directions.
+  template <typename Transmittance>
+  Albedo albedo(const Vec3& wo, const Vec2& uv, const Transmittance& transmittance) const {
+    const std::optional<Vec3> inside = bentInwards(wo);
+    if (!inside) return {};
+    const float entering = transmittance(std::abs(wo.z()));
+    const Rgb depth = depth_->eval(uv);
+    Albedo parts = nestedAlbedo(*inside, uv);
+    Rgb mean = Rgb::Zero();
+    for (const DiffuseRay& ray : diffuseRays_) mean += transmittance(ray.outside) * (-depth / ray.inside).exp();
+    const Rgb left = entering * (-depth / std::abs(inside->z())).exp();
+    parts.constant *= left * mean * (inverseEta2_ / static_cast<float>(diffuseRays_.size()));
+    parts.directional *= left * left;
+    parts.delta *= left * left;
+    return parts;
+  }
+
+  const Bsdf& nested() const { return *nested_; }
+
+ private:
+  /// Cosines outside and inside of light that leaves the layer, one of a number of equal shares of diffuse light.
+  struct DiffuseRay {
+    float outside, inside;
+  };
+
+  std::optional<Vec3> bentInwards(const Vec3& w) const;
+  std::optional<Vec3> bentOutwards(const Vec3& w) const;
+  Rgb absorption(const Vec3& oInside, const Vec3& iInside, const Vec2& uv) const;
+  Albedo nestedAlbedo(const Vec3& inside, const Vec2& uv) const;
+
+  BsdfPtr nested_;
+  double eta_;
+  float inverseEta2_;
+  TexturePtr depth_;
+  std::array<DiffuseRay, 16> diffuseRays_;
+};
+
+}  // namespace lobe
