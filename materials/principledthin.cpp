@@ -78,7 +78,8 @@ class Point {
     choice -= shares_.reflected;
     if (choice < shares_.transmitted) {
       const std::optional<Vec3> mirrored = transmitting_.sampleReflection(wo, u);
-      return mirrored ? std::optional(flipped(*mirrored)) : std::nullopt;
+      if (!mirrored || !facesAway(wo, flipped(*mirrored))) return std::nullopt;
+      return flipped(*mirrored);
     }
     const Vec3 wi = squareToCosineHemisphere(u);
     return choice - shares_.transmitted < shares_.diffuseReflected ? wi : flipped(wi);

@@ -150,7 +150,6 @@ TEST_CASE("materials: every model samples its density") {
                                                   {"specular", 0.8}})},
       {"coated diffuse", bsdfOf("coating", {{"sigma_a", 0.3}}, {diffuse})},
       {"coated metal", bsdfOf("coating", {{"int_ior", 1.8}}, {metal})},
-      {"coating of lower index", bsdfOf("coating", {{"int_ior", 1.0}, {"ext_ior", 1.3}}, {metal})},
       {"coated on both sides", bsdfOf("coating", {}, {bsdfOf("twosided", {}, {dull})})},
       {"roughly coated metal", bsdfOf("roughcoating", {{"alpha", 0.2}}, {metal})},
       {"roughly coated plastic", bsdfOf("roughcoating", {{"alpha", 0.05}}, {bsdfOf("twosided", {}, {plastic})})},

@@ -137,7 +137,7 @@ TEST_CASE("materials: a coated mirror by hand") {
 }
 
 TEST_CASE("materials: a coated white surface loses what the coating throws back from within") {
-  for (const double eta : {1.3, 1.8}) {
+  for (const double eta : {0.8, 1.3, 1.8}) {
     const BsdfPtr smooth = coated(diffuseOf(1.0), eta);
     const Vec3 wo = directionAt(40.0, 10.0);
     // Of diffuse light from within, 1 − F̄(1/η) gets out.
@@ -149,15 +149,19 @@ TEST_CASE("materials: a coated white surface loses what the coating throws back 
 }
 
 TEST_CASE("materials: the parts of coated glossy surfaces add up") {
-  const BsdfPtr metal = bsdfOf("roughconductor", {{"alpha", 0.2}, {"material", std::string("Ag")}});
+  // Narrow, so that no part of the lobe meets the coating from within beyond the critical angle.
+  const BsdfPtr metal = bsdfOf("roughconductor", {{"alpha", 0.02}, {"material", std::string("Ag")}});
   const BsdfPtr plastic = bsdfOf("plastic");
-  for (const BsdfPtr& bsdf : {coated(metal, 1.5, 0.1), roughlyCoated(metal, 0.1, 1.5), coated(plastic, 1.4),
-                              roughlyCoated(plastic, 0.2, 1.4, 0.2), roughlyCoated(mirrorOf(0.9), 0.2, 1.5)})
+  const std::initializer_list<BsdfPtr> models = {coated(metal, 1.5, 0.1), roughlyCoated(metal, 0.1, 1.5),
+                                                 coated(plastic, 1.4), roughlyCoated(plastic, 0.2, 1.4, 0.2),
+                                                 roughlyCoated(mirrorOf(0.9), 0.2, 1.5)};
+  for (const BsdfPtr& bsdf : models)
     for (const double elevation : {0.0, 60.0}) {
       const Vec3 wo = directionAt(elevation, 70.0);
       const Mean found = sampledAlbedo(*bsdf, wo, 20000);
+      INFO("model " << &bsdf - models.begin() << " at " << elevation);
       CHECK(found.value() < 1.0);
-      CHECK(luminance(bsdf->albedo(wo, kUv)) == Approx(found.value()).margin(0.05));
+      CHECK(luminance(bsdf->albedo(wo, kUv)) == Approx(found.value()).margin(0.03));
     }
   // Of a metal under a coating, nothing is described but the coating.
   CHECK(coated(metal, 1.5)->lobes().empty());

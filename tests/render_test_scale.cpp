@@ -165,7 +165,7 @@ TEST_CASE("render: bumps have the same height when a scene is scaled") {
   const Scene plain = Room(1).read(), tiny = Room(1e-10).read();
   struct Recorder : Diffuse {
     Recorder() : Diffuse(0.5f) {}
-    Vec3 perturbedNormal(const Vec2&, const Vec3& dpdu, const Vec3&) const override {
+    Vec3 perturbedNormal(const Vec3&, const Vec2&, const Vec3& dpdu, const Vec3&) const override {
       length = dpdu.norm();
       return Vec3::UnitZ();
     }

@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "materials/sampling.h"
 #include "measured_files.h"
 #include "scenes_test_tools.h"
 
@@ -186,6 +187,102 @@ TEST_CASE("scenes: principled as Mitsuba 3 spells it") {
   CHECK(fault.find("either eta or specular") != std::string::npos);
   CHECK(faultOf("<bsdf type=\"principled\">" + number("clearcoat_glass", "1") + "</bsdf>").find("clearcoat_gloss") !=
         std::string::npos);
+}
+
+TEST_CASE("scenes: mapped normals flip and shadow by default from version 3 on") {
+  const auto shadows = [](const std::string& version, const std::string& option) {
+    const Scene scene =
+        readText("<scene version=\"" + version + "\"><shape type=\"sphere\"><bsdf type=\"bumpmap\">" + option +
+                 "<texture type=\"checkerboard\"/>" + diffuse("0.5") + "</bsdf></shape>" + kSensor + "</scene>");
+    return scene.materials.at(0).bsdf->shadowsTerminator();
+  };
+  CHECK(shadows("3.0.0", ""));
+  CHECK(shadows("3.7.1", ""));
+  CHECK_FALSE(shadows("2.1.0", ""));
+  CHECK_FALSE(shadows("0.6.0", ""));
+  CHECK_FALSE(shadows("3.0.0", "<boolean name=\"use_shadowing_function\" value=\"false\"/>"));
+  CHECK(shadows("2.1.0", "<boolean name=\"use_shadowing_function\" value=\"true\"/>"));
+  const Scene leaning = readBody(
+      "<shape type=\"sphere\"><bsdf type=\"normalmap\"><boolean name=\"flip_invalid_normals\" value=\"false\"/>"
+      "<texture type=\"checkerboard\"><rgb name=\"color0\" value=\"0.8 0.5 0.9\"/></texture>" +
+      diffuse("0.5") + "</bsdf></shape>");
+  const auto normal = [](const Scene& scene) {
+    return scene.materials.at(0).bsdf->perturbedNormal(Vec3(-0.9f, 0.0f, 0.2f).normalized(), Vec2(0.25f, 0.25f),
+                                                       Vec3::UnitX(), Vec3::UnitY());
+  };
+  CHECK(normal(leaning).x() == Approx(0.6f).epsilon(1e-4));
+  CHECK(leaning.notes.empty());
+}
+
+TEST_CASE("scenes: reflectances above 1 are scaled below version 2, and kept above, with a warning at their line") {
+  const auto read = [](const std::string& version, const std::string& option = "") {
+    return readText("<scene version=\"" + version + "\">\n<shape type=\"sphere\"><bsdf type=\"plastic\">" + option +
+                    "\n <rgb name=\"diffuseReflectance\" value=\"255 255 25.5\"/></bsdf></shape>" + kSensor +
+                    "</scene>");
+  };
+  const auto diffuseShare = [](const Scene& scene) {
+    return scene.materials.at(0).bsdf->mixture(kUp, Vec2::Zero()).constant;
+  };
+  const Scene old = read("0.5.0");
+  REQUIRE(old.warnings.size() == 1);
+  CHECK_THAT(old.warnings[0], Catch::Contains("test.xml:3:2: bsdf \"plastic\": diffuse_reflectance is up to 255") &&
+                                  Catch::Contains("scaled"));
+  const Scene today = read("3.0.0");
+  REQUIRE(today.warnings.size() == 1);
+  CHECK_THAT(today.warnings[0], Catch::Contains("test.xml:3:2: ") && Catch::Contains("kept"));
+  CHECK(diffuseShare(old) == Approx(diffuseShare(today) * 0.99f / 255.0f));
+  const Scene insisting = read("0.5.0", "<boolean name=\"ensureEnergyConservation\" value=\"false\"/>");
+  CHECK(insisting.warnings.empty());
+  CHECK(diffuseShare(insisting) == Approx(diffuseShare(today)));
+  CHECK(read("").materials.at(0).bsdf->albedo(kUp, Vec2::Zero()).maxCoeff() <= 1.0f);
+}
+
+TEST_CASE("scenes: textures above 1 are scaled as a whole") {
+  const Scene scene = readText(
+      "<scene version=\"0.6.0\"><shape type=\"sphere\"><bsdf type=\"diffuse\"><texture type=\"scale\" "
+      "name=\"reflectance\"><float name=\"scale\" value=\"10\"/><texture "
+      "type=\"checkerboard\"/></texture></bsdf></shape>" +
+      std::string(kSensor) + "</scene>");
+  CHECK(scene.warnings.size() == 1);
+  CHECK(albedoAt(scene.materials.at(0).bsdf, Vec2(0.25f, 0.25f)) == Approx(0.99f));
+  CHECK(albedoAt(scene.materials.at(0).bsdf, Vec2(0.75f, 0.25f)) == Approx(0.495f));
+}
+
+TEST_CASE("scenes: mixture weights above 1 in sum") {
+  const auto read = [](const std::string& option) {
+    return readText("<scene version=\"0.6.0\"><shape type=\"sphere\"><bsdf type=\"mixturebsdf\">" + option +
+                    "\n<string name=\"weights\" value=\"1, 1\"/>" + diffuse("0.08") + diffuse("0.9") +
+                    "</bsdf></shape>" + kSensor + "</scene>");
+  };
+  const Scene given = read("<boolean name=\"ensureEnergyConservation\" value=\"false\"/>");
+  CHECK(given.warnings.empty());
+  CHECK(albedoAt(given.materials.at(0).bsdf) == Approx(0.98f));
+  const Scene scaled = read("");
+  REQUIRE(scaled.warnings.size() == 1);
+  CHECK_THAT(scaled.warnings[0], Catch::Contains("test.xml:2:1: "));
+  CHECK(albedoAt(scaled.materials.at(0).bsdf) == Approx(0.49f));
+}
+
+TEST_CASE("scenes: coatings and thin surfaces as Mitsuba spells them") {
+  const std::string coat =
+      "<float name=\"intIOR\" value=\"1.5\"/><float name=\"extIOR\" value=\"1\"/><float name=\"thickness\" "
+      "value=\"2\"/><spectrum name=\"sigmaA\" value=\"0.1 0.2 0.5\"/>"
+      "<spectrum name=\"specularReflectance\" value=\"0.5\"/>";
+  const BsdfPtr smooth = bsdfOf("<bsdf type=\"coating\">" + coat + diffuse("1") + "</bsdf>");
+  // Straight through 2 of thickness and back.
+  const Rgb expected = (-4.0f * Rgb(0.1f, 0.2f, 0.5f)).exp() * (0.96f * 0.96f / (2.25f * kPi));
+  CHECK(smooth->eval(kUp, kUp, Vec2::Zero()).isApprox(expected, 1e-4f));
+  CHECK(smooth->sampleDelta(kUp, Vec2::Zero(), 0.5f)->weight.x() == Approx(0.02f));
+  const BsdfPtr rough = bsdfOf("<bsdf type=\"roughcoating\"><string name=\"distribution\" value=\"ggx\"/>" +
+                               number("alpha", "0.2") + coat + diffuse("0") + "</bsdf>");
+  CHECK(rough->lobes()[0]->summary() == "ggx α 0.2, dielectric 1.5");
+  CHECK(rough->mixture(kUp, Vec2::Zero()).glossy[0].tint == Approx(0.5f));
+  const BsdfPtr thin = bsdfOf("<bsdf type=\"principledthin\"><rgb name=\"base_color\" value=\"0.7 0.1 0.1\"/>" +
+                              number("roughness", "0.15") + number("spec_tint", "0.1") + number("anisotropic", "0.5") +
+                              number("spec_trans", "0.8") + number("diff_trans", "0.3") + number("eta", "1.33") +
+                              number("specular_transmittance_sampling_rate", "1") + "</bsdf>");
+  CHECK(thin->transmits());
+  CHECK_THAT(faultOf("<bsdf type=\"hk\"/>"), Catch::Contains("unknown bsdf type \"hk\""));
 }
 
 }  // namespace lobe

@@ -171,7 +171,7 @@ TEST_CASE("scenes: a bump of an MTL tilts the normal") {
   slope += std::string("\0\0\0\xff\xff\xff\0\0", 8);
   files.folder.write("slope.bmp", slope);
   const Scene scene = files.read();
-  const Vec3 normal = bsdfOf(scene, 0).perturbedNormal({0.5f, 0.5f}, Vec3::UnitX(), Vec3::UnitY());
+  const Vec3 normal = bsdfOf(scene, 0).perturbedNormal(Vec3::UnitZ(), {0.5f, 0.5f}, Vec3::UnitX(), Vec3::UnitY());
   CHECK(normal.z() == Approx(1 / std::sqrt(5)).epsilon(1e-3));
   CHECK(normal.x() == Approx(-2 / std::sqrt(5)).epsilon(1e-3));
 }

@@ -165,6 +165,34 @@ TEST_CASE("unbiased: path, guided and product agree through frosted glass on met
   CHECK_FALSE(agree(path, blocks(studio.render(WrongIntegrator(studio), 512, 4), 5)));
 }
 
+TEST_CASE("unbiased: path, guided and product agree on coated, thin and mapped surfaces", "[slow]") {
+  const lobe::test::Folder folder;
+  std::ofstream(folder / "coated.xml") << R"(<scene version="3.0.0">
+    <sensor type="perspective"><float name="fov" value="35"/>
+      <transform name="to_world"><lookat origin="0, -6, 3" target="0, 0, 0.6" up="0, 0, 1"/></transform></sensor>
+    <shape type="rectangle"><transform name="to_world"><scale value="4"/></transform>
+      <bsdf type="normalmap"><texture type="checkerboard">
+          <rgb name="color0" value="0.8, 0.5, 0.9"/><rgb name="color1" value="0.3, 0.9, 0.8"/></texture>
+        <bsdf type="roughcoating"><float name="alpha" value="0.2"/>
+          <bsdf type="roughconductor"><float name="alpha" value="0.3"/></bsdf></bsdf></bsdf></shape>
+    <shape type="sphere"><point name="center" x="-1.2" y="0" z="1"/>
+      <bsdf type="coating"><rgb name="sigma_a" value="0.1, 0.3, 0.6"/>
+        <bsdf type="roughplastic"><float name="alpha" value="0.2"/></bsdf></bsdf></shape>
+    <shape type="rectangle">
+      <transform name="to_world"><rotate x="1" angle="80"/><translate x="1.4" z="1"/></transform>
+      <bsdf type="principledthin"><float name="roughness" value="0.5"/><float name="spec_trans" value="0.5"/>
+        <float name="diff_trans" value="0.8"/></bsdf></shape>
+    <shape type="sphere"><point name="center" x="3" y="1" z="4"/>
+      <emitter type="area"><rgb name="radiance" value="4, 4, 3"/></emitter></shape>
+    <emitter type="constant"><rgb name="radiance" value="0.2, 0.25, 0.3"/></emitter></scene>)";
+  const Studio studio(readScene(folder / "coated.xml"), 30, 20);
+  REQUIRE(studio.illumination().records().size() > 10);
+  const auto path = blocks(studio.render(studio.path(), 1024, 1), 5);
+  CHECK(agree(path, blocks(studio.render(studio.guided(), 512, 2), 5)));
+  CHECK(agree(path, blocks(studio.render(studio.product(), 512, 3), 5)));
+  CHECK_FALSE(agree(path, blocks(studio.render(WrongIntegrator(studio), 512, 4), 5)));
+}
+
 TEST_CASE("unbiased: training and rendering give the same bytes on any number of threads", "[slow]") {
   const auto renderWith = [](std::size_t threads) {
     const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism, threads);
