@@ -17,7 +17,7 @@ Microfacet::Kind readKind(const Parameters& parameters) {
   std::string name = parameters.text("distribution", "beckmann");
   std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (name == "phong" || name == "as")
-    parameters.note(fmt::format("distribution {} is taken for Beckmann's of the same alpha", name));
+    parameters.warn("distribution", fmt::format("distribution {} is taken for Beckmann's of the same alpha", name));
   if (name == "phong" || name == "as" || name == "beckmann") return Microfacet::Kind::beckmann;
   if (name == "ggx") return Microfacet::Kind::ggx;
   throw ParameterError("distribution",

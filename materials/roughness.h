@@ -21,9 +21,9 @@ struct LocalRoughness {
 class Roughness {
  public:
   /// distribution (default beckmann) and alpha (default 0.1), or alpha_u and alpha_v, numbers or textures, of which
-  /// the luminance is taken; sample_visible is accepted, and so always. Notes what is taken for something else: the
-  /// distributions phong and as, and a number below 1e-4. ParameterError: unknown distribution, a number not in [0,
-  /// 10].
+  /// the luminance is taken; sample_visible is accepted, and so always. Warns of the distributions phong and as, which
+  /// are taken for Beckmann's; notes a number below 1e-4, which becomes that. ParameterError: unknown distribution, a
+  /// number not in [0, 10].
   static Roughness read(const Parameters& parameters);
 
   /// Textured values are clamped to [1e-4, 1].

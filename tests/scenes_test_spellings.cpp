@@ -213,7 +213,8 @@ TEST_CASE("scenes: roughness as people write it") {
   CHECK(value(rough(distribution("GGX") + alpha + "0.3\"/>")) == value(rough(distribution("ggx") + alpha + "0.3\"/>")));
   const Scene phong = rough(distribution("phong") + alpha + "0.3\"/>");
   CHECK(value(phong) == value(rough(alpha + "0.3\"/>")));
-  CHECK(phong.notes.size() == 1);
+  REQUIRE(phong.warnings.size() == 1);
+  CHECK_THAT(phong.warnings[0], Catch::Contains("distribution phong is taken for Beckmann's"));
   CHECK(rough(alpha + "0\"/>").notes ==
         std::vector<std::string>{"bsdf \"roughconductor\": alpha 0 is taken for 0.0001"});
   CHECK(rough("<float name=\"alphaU\" value=\"0.3\"/>").notes.size() == 1);
@@ -269,7 +270,8 @@ TEST_CASE("scenes: slips are told with the nearest name") {
   CHECK_THAT(faultOf("<bsdf type=\"diffuse\"><flaot name=\"reflectance\" value=\"1\"/></bsdf>"),
              Catch::Contains("did you mean float?"));
   CHECK_THAT(faultOf("<bsdf type=\"roughconductor\"><float name=\"alfa_u\" value=\"1\"/></bsdf>"),
-             Catch::Contains("did you mean alpha_u? known are alpha, alpha_u, alpha_v, distribution, eta"));
+             Catch::Contains("did you mean alpha_u? known are alpha, alpha_u, alpha_v, distribution, "
+                             "ensure_energy_conservation, eta"));
   CHECK_THAT(faultOf("<bsdf type=\"velvet\"/>"), !Catch::Contains("did you mean"));
 }
 
