@@ -67,4 +67,24 @@ class CoatedBase {
   std::array<DiffuseRay, 16> diffuseRays_;
 };
 
+/// What smooth and rough coatings share of the nested model: the sides, and the mapped normals, which the coating
+/// follows.
+class CoatedBsdf : public Bsdf {
+ public:
+  explicit CoatedBsdf(CoatedBase base) : base_(std::move(base)) {}
+
+  bool transmits() const final { return base_.nested().transmits(); }
+  Vec3 perturbedNormal(const Vec3& wo, const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const final {
+    return base_.nested().perturbedNormal(wo, uv, dpdu, dpdv);
+  }
+  bool mapsNormals() const final { return base_.nested().mapsNormals(); }
+  bool shadowsTerminator() const final { return base_.nested().shadowsTerminator(); }
+
+ protected:
+  const CoatedBase& base() const { return base_; }
+
+ private:
+  CoatedBase base_;
+};
+
 }  // namespace lobe

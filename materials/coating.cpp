@@ -10,23 +10,23 @@
 namespace lobe {
 namespace {
 
-class Coating final : public Bsdf {
+class Coating final : public CoatedBsdf {
  public:
   Coating(BsdfPtr nested, double eta, TexturePtr depth, TexturePtr specular)
-      : base_(std::move(nested), eta, std::move(depth)), eta_(eta), specular_(std::move(specular)) {}
+      : CoatedBsdf(CoatedBase(std::move(nested), eta, std::move(depth))), eta_(eta), specular_(std::move(specular)) {}
 
   Rgb eval(const Vec3& wo, const Vec3& wi, const Vec2& uv) const override {
-    return base_.eval(wo, wi, uv) * (transmittance(std::abs(wo.z())) * transmittance(std::abs(wi.z())));
+    return base().eval(wo, wi, uv) * (transmittance(std::abs(wo.z())) * transmittance(std::abs(wi.z())));
   }
 
   std::optional<BsdfSample> sample(const Vec3& wo, const Vec2& uv, float choice, const Vec2& u) const override {
-    std::optional<BsdfSample> result = base_.sample(wo, uv, choice, u);
+    std::optional<BsdfSample> result = base().sample(wo, uv, choice, u);
     if (!result || !(result->pdf > 0.0f)) return std::nullopt;
     result->f *= transmittance(std::abs(wo.z())) * transmittance(std::abs(result->wi.z()));
     return result;
   }
 
-  float pdf(const Vec3& wo, const Vec3& wi, const Vec2& uv) const override { return base_.pdf(wo, wi, uv); }
+  float pdf(const Vec3& wo, const Vec3& wi, const Vec2& uv) const override { return base().pdf(wo, wi, uv); }
 
   std::optional<DeltaSample> sampleDelta(const Vec3& wo, const Vec2& uv, float choice) const override {
     const Rgb mirrored = specularAlbedo(wo, uv);
@@ -35,7 +35,7 @@ class Coating final : public Bsdf {
     if (!(specular + nested > 0.0f) || wo.z() == 0.0f) return std::nullopt;
     const float p = specular / (specular + nested);
     if (choice < p) return DeltaSample{Vec3(-wo.x(), -wo.y(), wo.z()), mirrored / p, 1.0f};
-    std::optional<DeltaSample> result = base_.sampleDelta(wo, uv, (choice - p) / (1.0f - p));
+    std::optional<DeltaSample> result = base().sampleDelta(wo, uv, (choice - p) / (1.0f - p));
     if (result)
       result->weight *= transmittance(std::abs(wo.z())) * transmittance(std::abs(result->wi.z())) / (1.0f - p);
     return result;
@@ -62,13 +62,6 @@ class Coating final : public Bsdf {
     return specularAlbedo(wo, uv) + nestedAlbedo(wo, uv).sum();
   }
 
-  bool transmits() const override { return base_.nested().transmits(); }
-  Vec3 perturbedNormal(const Vec3& wo, const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const override {
-    return base_.nested().perturbedNormal(wo, uv, dpdu, dpdv);
-  }
-  bool mapsNormals() const override { return base_.nested().mapsNormals(); }
-  bool shadowsTerminator() const override { return base_.nested().shadowsTerminator(); }
-
  private:
   float transmittance(float cosine) const {
     return static_cast<float>(1.0 - fresnelDielectric(cosine, eta_).reflectance);
@@ -77,10 +70,9 @@ class Coating final : public Bsdf {
     return (1.0f - transmittance(std::abs(wo.z()))) * specular_->eval(uv);
   }
   CoatedBase::Albedo nestedAlbedo(const Vec3& wo, const Vec2& uv) const {
-    return base_.albedo(wo, uv, [this](float cosine) { return transmittance(cosine); });
+    return base().albedo(wo, uv, [this](float cosine) { return transmittance(cosine); });
   }
 
-  CoatedBase base_;
   double eta_;
   TexturePtr specular_;
 };

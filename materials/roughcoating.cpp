@@ -16,13 +16,13 @@ Vec3 upright(const Vec3& w, const Vec3& wo) {
   return wo.z() > 0.0f ? w : Vec3(w.x(), w.y(), -w.z());
 }
 
-class RoughCoating final : public Bsdf {
+class RoughCoating final : public CoatedBsdf {
  public:
   RoughCoating(Roughness roughness, const CoatingParameters& p)
-      : roughness_(std::move(roughness)),
+      : CoatedBsdf(CoatedBase(p.nested, p.eta, p.depth)),
+        roughness_(std::move(roughness)),
         eta_(p.eta),
         transmittance_(roughness_, eta_),
-        base_(p.nested, p.eta, p.depth),
         specular_(p.specular) {
     for (const Microfacet& level : roughness_.levels()) lobes_.push_back(std::make_shared<DielectricLobe>(level, eta_));
   }
@@ -34,7 +34,7 @@ class RoughCoating final : public Bsdf {
     const double facets = roughness.microfacet.reflection(upright(wo, wo), upright(wi, wo), &cosHalf);
     const double glossy = facets > 0.0 ? facets * fresnelDielectric(cosHalf, eta_).reflectance : 0.0;
     return static_cast<float>(glossy) * specular_->eval(uv) +
-           base_.eval(wo, wi, uv) * (passing(roughness, wo) * passing(roughness, wi));
+           base().eval(wo, wi, uv) * (passing(roughness, wo) * passing(roughness, wi));
   }
 
   std::optional<BsdfSample> sample(const Vec3& wo, const Vec2& uv, float choice, const Vec2& u) const override {
@@ -45,7 +45,7 @@ class RoughCoating final : public Bsdf {
       const std::optional<Vec3> wi = roughness.microfacet.sampleReflection(upright(wo, wo), u);
       return wi ? sampled(wo, upright(*wi, wo), uv, 1.0f) : std::nullopt;
     }
-    const std::optional<BsdfSample> nested = base_.sample(wo, uv, (choice - p) / (1.0f - p), u);
+    const std::optional<BsdfSample> nested = base().sample(wo, uv, (choice - p) / (1.0f - p), u);
     return nested ? sampled(wo, nested->wi, uv, nested->eta) : std::nullopt;
   }
 
@@ -54,11 +54,11 @@ class RoughCoating final : public Bsdf {
     const LocalRoughness roughness = roughness_.at(uv);
     const float p = partsAt(roughness, wo, uv).glossyProbability();
     return p * static_cast<float>(roughness.microfacet.reflectionPdf(upright(wo, wo), upright(wi, wo))) +
-           (1.0f - p) * base_.pdf(wo, wi, uv);
+           (1.0f - p) * base().pdf(wo, wi, uv);
   }
 
   std::optional<DeltaSample> sampleDelta(const Vec3& wo, const Vec2& uv, float choice) const override {
-    std::optional<DeltaSample> result = base_.sampleDelta(wo, uv, choice);
+    std::optional<DeltaSample> result = base().sampleDelta(wo, uv, choice);
     const LocalRoughness roughness = roughness_.at(uv);
     if (result) result->weight *= passing(roughness, wo) * passing(roughness, result->wi);
     return result;
@@ -91,13 +91,6 @@ class RoughCoating final : public Bsdf {
     return parts.glossy + parts.nested.sum();
   }
 
-  bool transmits() const override { return base_.nested().transmits(); }
-  Vec3 perturbedNormal(const Vec3& wo, const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const override {
-    return base_.nested().perturbedNormal(wo, uv, dpdu, dpdv);
-  }
-  bool mapsNormals() const override { return base_.nested().mapsNormals(); }
-  bool shadowsTerminator() const override { return base_.nested().shadowsTerminator(); }
-
  private:
   /// Albedos of the coating's own reflection and of what it coats.
   struct Parts {
@@ -110,7 +103,7 @@ class RoughCoating final : public Bsdf {
   /// Light lost between facets counts as reflected.
   Parts partsAt(const LocalRoughness& roughness, const Vec3& wo, const Vec2& uv) const {
     return {(1.0f - passing(roughness, wo)) * specular_->eval(uv),
-            base_.albedo(wo, uv, [&](float cosine) { return transmittance_(roughness, cosine); })};
+            base().albedo(wo, uv, [&](float cosine) { return transmittance_(roughness, cosine); })};
   }
   float passing(const LocalRoughness& roughness, const Vec3& w) const {
     return transmittance_(roughness, std::abs(w.z()));
@@ -125,7 +118,6 @@ class RoughCoating final : public Bsdf {
   Roughness roughness_;
   double eta_;
   VaryingTransmittance transmittance_;
-  CoatedBase base_;
   std::vector<LobePtr> lobes_;  ///< one for each level
   TexturePtr specular_;
 };

@@ -58,6 +58,15 @@ std::vector<Block> exactly(double value, std::size_t count) {
   return std::vector<Block>(count, Block{value, 0});
 }
 
+/// All integrators against path tracing, and one that is wrong.
+void checkAgreement(const Studio& studio) {
+  REQUIRE(studio.illumination().records().size() > 10);
+  const auto path = blocks(studio.render(studio.path(), 1024, 1), 5);
+  CHECK(agree(path, blocks(studio.render(studio.guided(), 512, 2), 5)));
+  CHECK(agree(path, blocks(studio.render(studio.product(), 512, 3), 5)));
+  CHECK_FALSE(agree(path, blocks(studio.render(WrongIntegrator(studio), 512, 4), 5)));
+}
+
 }  // namespace
 
 TEST_CASE("unbiased: path, guided and product agree on the demo scene", "[slow]") {
@@ -158,11 +167,7 @@ TEST_CASE("unbiased: path, guided and product agree through frosted glass on met
       <emitter type="area"><rgb name="radiance" value="4, 4, 3"/></emitter></shape>
     <emitter type="constant"><rgb name="radiance" value="0.2, 0.25, 0.3"/></emitter></scene>)";
   const Studio studio(readScene(folder / "glass.xml"), 30, 20);
-  REQUIRE(studio.illumination().records().size() > 10);
-  const auto path = blocks(studio.render(studio.path(), 1024, 1), 5);
-  CHECK(agree(path, blocks(studio.render(studio.guided(), 512, 2), 5)));
-  CHECK(agree(path, blocks(studio.render(studio.product(), 512, 3), 5)));
-  CHECK_FALSE(agree(path, blocks(studio.render(WrongIntegrator(studio), 512, 4), 5)));
+  checkAgreement(studio);
 }
 
 TEST_CASE("unbiased: path, guided and product agree on coated, thin and mapped surfaces", "[slow]") {
@@ -186,11 +191,7 @@ TEST_CASE("unbiased: path, guided and product agree on coated, thin and mapped s
       <emitter type="area"><rgb name="radiance" value="4, 4, 3"/></emitter></shape>
     <emitter type="constant"><rgb name="radiance" value="0.2, 0.25, 0.3"/></emitter></scene>)";
   const Studio studio(readScene(folder / "coated.xml"), 30, 20);
-  REQUIRE(studio.illumination().records().size() > 10);
-  const auto path = blocks(studio.render(studio.path(), 1024, 1), 5);
-  CHECK(agree(path, blocks(studio.render(studio.guided(), 512, 2), 5)));
-  CHECK(agree(path, blocks(studio.render(studio.product(), 512, 3), 5)));
-  CHECK_FALSE(agree(path, blocks(studio.render(WrongIntegrator(studio), 512, 4), 5)));
+  checkAgreement(studio);
 }
 
 TEST_CASE("unbiased: training and rendering give the same bytes on any number of threads", "[slow]") {
