@@ -51,7 +51,7 @@ std::filesystem::path ObjMaterialReader::resolve(const Place& place, std::string
   const std::filesystem::path bare = std::filesystem::path(name).filename();
   for (const std::filesystem::path& candidate : {std::filesystem::path(name), bare}) {
     if (isThere(place.folder / candidate)) return place.folder / candidate;
-    const std::filesystem::path elsewhere = context_.file.resolve(candidate.string(), place.location);
+    std::filesystem::path elsewhere = context_.file.resolve(candidate.string(), place.location);
     if (isThere(elsewhere)) return elsewhere;
   }
   return context_.file.resolve((place.folder / name).string(), place.location);

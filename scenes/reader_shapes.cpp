@@ -251,12 +251,12 @@ void ShapeReader::addMesh(int group, pugi::xml_node node, Mesh mesh, const std::
   };
   for (const auto& [material, bsdf] : parts.named) {
     mesh.source.obj.materials.push_back(material);
-    add(name + ":" + material, materials_.use(bsdf));
+    add(fmt::format("{}:{}", name, material), materials_.use(bsdf));
   }
   if (mesh.loadMaterials && !parts.bsdf)
     for (const auto& [material, index] : objMaterials_.read(node, mesh.location, mesh.source)) {
       mesh.source.obj.materials.push_back(material);
-      add(name + ":" + material, index);
+      add(fmt::format("{}:{}", name, material), index);
     }
   add(name, materialOf(parts));
   meshes_.push_back(std::move(mesh));

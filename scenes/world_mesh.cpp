@@ -167,7 +167,7 @@ void turnOver(TriangleMesh& mesh) {
 Eigen::Matrix3f checkedLinear(const Eigen::Matrix4f& toWorld) {
   if (!toWorld.allFinite()) throw std::runtime_error("its transform holds numbers that are not finite");
   if (toWorld.row(3) != Eigen::RowVector4f(0, 0, 0, 1)) throw std::runtime_error("its transform is not affine");
-  const Eigen::Matrix3f linear = toWorld.topLeftCorner<3, 3>();
+  Eigen::Matrix3f linear = toWorld.topLeftCorner<3, 3>();
   if (linear.cast<double>().determinant() == 0) throw std::runtime_error("its transform is singular");
   return linear;
 }
