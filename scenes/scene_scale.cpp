@@ -107,6 +107,11 @@ struct LightScaling {
   void operator()(PointLight& light) const { scale(light.position, light.intensity); }
   void operator()(SpotLight& light) const { scale(light.position, light.intensity); }
   void operator()(DirectionalLight&) const {}
+  void operator()(ProjectorLight& light) const {
+    Rgb brightness = grey(light.scale);
+    scale(light.position, brightness);
+    light.scale = brightness.x();
+  }
 
   /// So that the irradiance, which falls with the square of the distance, is the same.
   void scale(Vec3& position, Rgb& intensity) const {
