@@ -112,6 +112,8 @@ MaterialReader::Made ObjMaterialReader::makeModel(const Place& place, const MtlM
 
 MaterialReader::Made ObjMaterialReader::makeOf(const Place& place, const MtlMaterial& material, const std::string& type,
                                                Parameters parameters, const std::vector<std::uint64_t>& children) {
+  // Mitsuba 0.6, the only one to read libraries, keeps reflectances from exceeding 1.
+  parameters.setDefault("ensure_energy_conservation", true);
   return makeFrom(context_, place.shape, std::move(parameters), [&](const Parameters& p) {
     try {
       return MaterialReader::makeOf(type, p, children);
