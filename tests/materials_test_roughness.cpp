@@ -113,7 +113,7 @@ TEST_CASE("materials: the lobes of textured roughness are levels that materials 
     CHECK(a->lobes()[0]->kind() == LobeKind::isotropic);
     // A texture that does not vary is a number.
     CHECK(roughOf(type, steps({0.3f, 0.3f}))->lobes().size() == sides);
-    CHECK(roughOf(type, constantTexture(grey(-1.0f)))->lobes()[0]->key() == roughOf(type, 1e-5)->lobes()[0]->key());
+    CHECK(roughOf(type, steps({-1.0f, -1.0f}))->lobes()[0]->key() == roughOf(type, 1e-5)->lobes()[0]->key());
     // What is below, above or not a number is clamped.
     const BsdfPtr wild = roughOf(type, steps({-1.0f, 100.0f, std::nanf("")}));
     CHECK(wild->lobes().size() == kRoughnessLevels * sides);

@@ -12,8 +12,7 @@ namespace {
 struct Floor {
   explicit Floor(BsdfPtr bsdf) {
     addShape(scene, rectangle({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), addMaterial(scene, std::move(bsdf)));
-    Image sky{4, 2, std::vector<Rgb>(8, grey(1.0f))};
-    scene.environment = environment(std::move(sky));
+    scene.environment = environment(Image(4, 2, grey(1.0f)));
   }
   Scene scene;
 };
