@@ -37,7 +37,7 @@ std::vector<Reflectance> someReflectances(const Studio& studio) {
 }  // namespace
 
 TEST_CASE("unbiased: lobes are looked up at the nearest elevation") {
-  const Studio studio(readScene(std::string(LOBE_SOURCE_DIR) + "/scenes/jewelry.xml"), 60, 40);
+  const Studio studio(readScene(std::filesystem::path(LOBE_SOURCE_DIR) / "scenes/jewelry.xml"), 60, 40);
   const std::vector<LobeRequest> requests = lobeRequests(studio.scene());
   int elevations = 0, others = 0;
   for (std::size_t lobe = 0; lobe < requests.size(); ++lobe) {
@@ -58,7 +58,7 @@ TEST_CASE("unbiased: lobes are looked up at the nearest elevation") {
 }
 
 TEST_CASE("unbiased: samples of trained records and fitted lobes have the density that is said", "[slow]") {
-  const Studio studio(readScene(std::string(LOBE_SOURCE_DIR) + "/scenes/jewelry.xml"), 60, 40);
+  const Studio studio(readScene(std::filesystem::path(LOBE_SOURCE_DIR) / "scenes/jewelry.xml"), 60, 40);
   const std::vector<Reflectance> reflectances = someReflectances(studio);
   const std::vector<IlluminationRecord> records = studio.illumination().records();
   REQUIRE(records.size() >= kRecords);
