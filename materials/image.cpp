@@ -21,6 +21,7 @@
 #include <fmt/format.h>
 
 #include "materials/fingerprint.h"
+#include "materials/jpeg_file.h"
 #include "materials/rgbe_file.h"
 
 // Private to this file, so that another copy elsewhere does not clash.
@@ -28,6 +29,7 @@
 #define STB_IMAGE_STATIC
 #define STBI_NO_GIF
 #define STBI_NO_HDR
+#define STBI_NO_JPEG
 #define STBI_NO_LINEAR
 #define STBI_NO_PIC
 #define STBI_NO_PNM
@@ -288,9 +290,18 @@ Encoding resolved(const Encoding& encoding, std::string_view bytes) {
   return gamma ? Encoding{Encoding::Kind::gamma, *gamma} : encoding;
 }
 
+Image readJpegImage(const std::filesystem::path& path, std::string_view bytes, const Encoding& encoding, Part part) {
+  if (part == Part::alpha) failWithoutAlpha(path);
+  const JpegSize size = naming(path, [&] { return sizeOfJpeg(bytes); });
+  checkExpansion(path, size.width, size.height, bytes.size());
+  const JpegPixels pixels = naming(path, [&] { return readJpeg(bytes); });
+  return decodeColours(pixels.codes.data(), pixels.width, pixels.height, encoding);
+}
+
 Image readOther(const std::filesystem::path& path, const Encoding& encoding, Part part) {
   const std::string bytes = readBytes(path);
   if (startsLikeRgbe(bytes)) return readHdr(path, bytes, part);
+  if (startsLikeJpeg(bytes)) return readJpegImage(path, bytes, encoding, part);
   const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
   const int length = static_cast<int>(bytes.size());
   int width = 0, height = 0, channels = 0;

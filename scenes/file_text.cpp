@@ -101,16 +101,25 @@ std::string readXmlText(const std::filesystem::path& path) {
   return isUtf8(encoding) ? bytes : toUtf8(path, bytes, encoding);
 }
 
+std::vector<std::size_t> lineStarts(std::string_view text) {
+  std::vector<std::size_t> starts = {0};
+  for (std::size_t i = 0; i < text.size(); ++i)
+    if (text[i] == '\n') starts.push_back(i + 1);
+  return starts;
+}
+
 std::string placeIn(const std::filesystem::path& path, std::string_view text, std::size_t offset) {
-  const std::size_t end = std::min(offset, text.size());
-  int line = 1, column = 1;
-  for (std::size_t i = 0; i < end; ++i) {
-    if (text[i] == '\n')
-      ++line, column = 1;
-    else if ((text[i] & 0xc0) != 0x80)  // bytes that continue a UTF-8 character do not count
-      ++column;
-  }
-  return fmt::format("{}:{}:{}", path.string(), line, column);
+  return placeIn(path, text, lineStarts(text), offset);
+}
+
+std::string placeIn(const std::filesystem::path& path, std::string_view text, const std::vector<std::size_t>& lines,
+                    std::size_t offset) {
+  offset = std::min(offset, text.size());
+  const auto next = std::ranges::upper_bound(lines, offset);
+  const std::string_view before = text.substr(*(next - 1), offset - *(next - 1));
+  // Bytes that continue a UTF-8 character do not count.
+  const auto column = std::ranges::count_if(before, [](char c) { return (c & 0xc0) != 0x80; }) + 1;
+  return fmt::format("{}:{}:{}", path.string(), next - lines.begin(), column);
 }
 
 }  // namespace lobe

@@ -3,6 +3,8 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
+#include <vector>
 
 namespace lobe {
 
@@ -12,7 +14,13 @@ namespace lobe {
 /// known, or is not in the encoding that it names.
 std::string readXmlText(const std::filesystem::path& path);
 
+/// The offsets at which the lines of a text begin.
+std::vector<std::size_t> lineStarts(std::string_view text);
+
 /// "FILE:LINE:COLUMN" of an offset in a file's text; columns count characters from one.
 std::string placeIn(const std::filesystem::path& path, std::string_view text, std::size_t offset);
+/// The same for a text whose lineStarts are known.
+std::string placeIn(const std::filesystem::path& path, std::string_view text, const std::vector<std::size_t>& lines,
+                    std::size_t offset);
 
 }  // namespace lobe

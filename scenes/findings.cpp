@@ -10,6 +10,8 @@ namespace lobe {
 namespace {
 
 constexpr std::size_t kMostLines = 10;
+/// Of faults; a file with more is not what it is taken for.
+constexpr std::size_t kMostKinds = 10000;
 
 std::string andMore(std::size_t count) {
   return count > 1 ? fmt::format(" ({} more of this kind)", count - 1) : "";
@@ -50,6 +52,7 @@ SceneError::SceneError(std::vector<Fault> all) : std::runtime_error(describe(all
 
 void Findings::fault(std::string where, const std::string& kind, std::string message, std::string consequence) {
   const auto [entry, isNew] = faultOfKind_.try_emplace(kind, faults_.size());
+  if (isNew && faults_.size() >= kMostKinds) throw SceneError(faults_);
   if (isNew)
     faults_.push_back({std::move(where), std::move(message), std::move(consequence)});
   else
@@ -58,10 +61,10 @@ void Findings::fault(std::string where, const std::string& kind, std::string mes
 
 void Findings::warn(const std::string& where, const std::string& kind, const std::string& message) {
   const auto [entry, isNew] = warningOfKind_.try_emplace(kind, warnings_.size());
-  if (isNew)
-    warnings_.push_back({fmt::format("{}: {}", where, message)});
-  else
-    ++warnings_[entry->second].count;
+  if (isNew) warnings_.push_back({where, message, 0});
+  Warning& warning = warnings_[entry->second];
+  // What is looked at twice is found twice.
+  if (warning.count == 0 || warning.where != where) ++warning.count;
 }
 
 void Findings::note(std::string text) {
@@ -77,7 +80,8 @@ void Findings::noteWithoutEffect(const std::string& owner, const std::string& pa
 
 std::vector<std::string> Findings::warnings() const {
   std::vector<std::string> lines;
-  for (const Warning& warning : warnings_) lines.push_back(warning.text + andMore(warning.count));
+  for (const Warning& warning : warnings_)
+    lines.push_back(fmt::format("{}: {}{}", warning.where, warning.message, andMore(warning.count)));
   return lines;
 }
 

@@ -51,8 +51,8 @@ class Findings {
 
  private:
   struct Warning {
-    std::string text;
-    std::size_t count = 1;
+    std::string where, message;
+    std::size_t count;
   };
   struct WithoutEffect {
     std::string owner;

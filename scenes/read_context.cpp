@@ -26,6 +26,12 @@ bool ReadContext::attempt(const std::string& consequence, const std::function<vo
   }
 }
 
+Nesting::Nesting(const ReadContext& context, pugi::xml_node node, int& depth) : depth_(depth) {
+  constexpr int kDeepest = 100;
+  if (depth >= kDeepest) context.file.fail(node, fmt::format("<{}>s nested more than {} deep", node.name(), kDeepest));
+  ++depth_;
+}
+
 std::string typeOf(const ReadContext& context, pugi::xml_node node) {
   const pugi::xml_attribute type = node.attribute("type");
   if (!type) context.file.fail(node, fmt::format("<{}> needs a type", node.name()));

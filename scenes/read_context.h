@@ -40,6 +40,19 @@ class ReadContext {
   Findings& findings;
 };
 
+/// While it lives, an element that may have others like it inside, by references too, is being read. Throws SceneError
+/// when they are nested too deeply to be read by recursion.
+class Nesting {
+ public:
+  Nesting(const ReadContext& context, pugi::xml_node node, int& depth);
+  ~Nesting() { --depth_; }
+  Nesting(const Nesting&) = delete;
+  Nesting& operator=(const Nesting&) = delete;
+
+ private:
+  int& depth_;
+};
+
 /// The type attribute; fails when there is none.
 std::string typeOf(const ReadContext& context, pugi::xml_node node);
 

@@ -12,6 +12,8 @@
 namespace lobe {
 namespace {
 
+constexpr int kMostParts = 1000;
+
 /// children: of the nested BSDFs. What a measured BSDF has from its file is in its lobes' keys.
 std::uint64_t fingerprintOf(const std::string& type, const Parameters& parameters,
                             std::span<const std::uint64_t> children, const Bsdf& bsdf) {
@@ -63,7 +65,11 @@ const MaterialReader::Made& MaterialReader::done(pugi::xml_node node) {
   const auto [entry, isNew] = done_.try_emplace(SceneFile::location(node));
   if (isNew) {
     Made made;
-    if (!context_.attempt("diffuse 0.5 is used", [&] { made = make(node); })) made = makeDiffuseOf(0.5f);
+    const auto read = [&] {
+      const Nesting nesting(context_, node, depth_);
+      made = make(node);
+    };
+    if (!context_.attempt("diffuse 0.5 is used", read)) made = makeDiffuseOf(0.5f);
     entry->second = std::move(made);
   } else if (!entry->second.bsdf) {
     context_.unsupported(node, fmt::format("circle at {}", SceneFile::location(node)), "a bsdf that refers to itself",
@@ -87,19 +93,24 @@ MaterialReader::Made MaterialReader::make(pugi::xml_node node) {
   const Encoded encoded = type == "normalmap" ? Encoded::linear
                           : type == "bumpmap" ? Encoded::asGivenSigned
                                               : Encoded::asGiven;
+  int parts = 1;
   std::vector<std::uint64_t> children;
   const auto onChild = [&](pugi::xml_node child, const std::string& name, Parameters& parameters) {
     if (elementName(child) != "bsdf") return textures_.take(child, name, parameters, encoded);
     const Made& nested = done(child);
     parameters.addChild(nested.bsdf);
     children.push_back(nested.fingerprint);
+    parts += nested.parts;
     return true;
   };
   Parameters parameters = readParameters(context_, node, "texture, bsdf, ref", onChild);
+  // Every look at the BSDF looks at all of them, and each that is referred to twice doubles them.
+  if (parts > kMostParts)
+    context_.file.fail(node, fmt::format("{}: more than {} bsdfs nested in one", describe(node), kMostParts));
   setDefaults(type, context_.file.majorVersion(), parameters);
   if (namesMeasurement(node) && !resolveFile(node, parameters)) return makeDiffuseOf(0.5f);
   const BsdfPtr bsdf = makeFrom(context_, node, parameters, [&](const Parameters& p) { return makeBsdf(type, p); });
-  return {bsdf, fingerprintOf(type, parameters, children, *bsdf)};
+  return {bsdf, fingerprintOf(type, parameters, children, *bsdf), parts};
 }
 
 bool MaterialReader::resolveFile(pugi::xml_node node, Parameters& parameters) {

@@ -27,6 +27,7 @@ class MaterialReader {
   struct Made {
     BsdfPtr bsdf;  ///< null while being read
     std::uint64_t fingerprint = 0;
+    int parts = 1;  ///< this BSDF and, as often as they are asked, those nested in it
   };
   /// Makes one that stands in no element, of parameters with their children, of which the fingerprints are given.
   /// Throws ParameterError.
@@ -48,6 +49,7 @@ class MaterialReader {
   Made circular_ = makeDiffuseOf(0.5f);      // stands for a BSDF inside itself
   std::map<std::ptrdiff_t, int> materials_;  // by place; the defaults at −1 and −2
   int unnamed_ = 0;
+  int depth_ = 0;  // of the BSDF being read
 };
 
 }  // namespace lobe

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -90,21 +91,28 @@ TexturePtr makeScaled(const Parameters& parameters) {
   return scaledTexture(parameters.onlyTexture(), parameters.colour("scale", grey(1.0f)));
 }
 
+constexpr int kMostParts = 1000;
+
 }  // namespace
 
 TexturePtr TextureReader::read(pugi::xml_node node, Encoded encoded) {
   const auto [entry, isNew] = done_.try_emplace({SceneFile::location(node), encoded});
+  Made& done = entry->second;
   if (isNew) {
-    TexturePtr made;
-    if (!context_.attempt("grey is used", [&] { made = make(node, encoded); }))
-      made = constantTexture(grey(kPlainGrey));
-    entry->second = std::move(made);
-  } else if (!entry->second) {
+    const int outer = std::exchange(parts_, 1);
+    const auto make = [&] {
+      const Nesting nesting(context_, node, depth_);
+      done.texture = makeOf(node, encoded);
+    };
+    if (!context_.attempt("grey is used", make)) done.texture = constantTexture(grey(kPlainGrey));
+    done.parts = std::exchange(parts_, outer);
+  } else if (!done.texture) {
     context_.unsupported(node, fmt::format("circle at {}", SceneFile::location(node)),
                          "a texture that refers to itself", "grey is used in it");
     return constantTexture(grey(kPlainGrey));
   }
-  return entry->second;
+  parts_ += done.parts;
+  return done.texture;
 }
 
 bool TextureReader::take(pugi::xml_node child, const std::string& name, Parameters& parameters, Encoded encoded) {
@@ -123,7 +131,7 @@ TexturePtr TextureReader::readFile(pugi::xml_node node, std::ptrdiff_t location,
   return makeFromBitmap(node, parameters, encoded);
 }
 
-TexturePtr TextureReader::make(pugi::xml_node node, Encoded encoded) {
+TexturePtr TextureReader::makeOf(pugi::xml_node node, Encoded encoded) {
   const std::string type = typeOf(context_, node);
   if (type != "bitmap" && type != "checkerboard" && type != "scale" && !isSpectrum(type)) {
     context_.unsupported(node, "texture " + type,
@@ -135,6 +143,9 @@ TexturePtr TextureReader::make(pugi::xml_node node, Encoded encoded) {
   Parameters parameters = readParameters(
       context_, node, "texture",
       [&](pugi::xml_node child, const std::string& name, Parameters& p) { return take(child, name, p, encoded); });
+  // Their means and bounds are found by looking at all of them.
+  if (parts_ > kMostParts)
+    context_.file.fail(node, fmt::format("{}: more than {} textures nested in one", describe(node), kMostParts));
   if (type == "bitmap" && encoded == Encoded::linear) parameters.set("raw", true, parameters.location("raw"));
   return makeFrom(context_, node, parameters, [&](const Parameters& p) {
     if (isSpectrum(type)) return makeSpectrum(context_, node, type, p);

@@ -27,12 +27,18 @@ class TextureReader {
   bool take(pugi::xml_node child, const std::string& name, Parameters& parameters, Encoded encoded = Encoded::asGiven);
 
  private:
-  TexturePtr make(pugi::xml_node node, Encoded encoded);
+  struct Made {
+    TexturePtr texture;  ///< null while being read
+    int parts = 1;       ///< this texture and, as often as they are asked, those nested in it
+  };
+  TexturePtr makeOf(pugi::xml_node node, Encoded encoded);
   TexturePtr makeFromBitmap(pugi::xml_node node, const Parameters& parameters, Encoded encoded);
 
   ReadContext& context_;
   ImageStore images_;
-  std::map<std::pair<std::ptrdiff_t, Encoded>, TexturePtr> done_;  // by place; null while being read
+  std::map<std::pair<std::ptrdiff_t, Encoded>, Made> done_;  // by place
+  int parts_ = 0;                                            // read so far for the element that is being read
+  int depth_ = 0;                                            // of the texture being read
 };
 
 }  // namespace lobe

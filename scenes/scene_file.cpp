@@ -15,6 +15,9 @@
 namespace lobe {
 namespace {
 
+// Definitions that use each other, and files that include each other, can multiply a small file without end.
+constexpr std::size_t kLongestValue = 1 << 20, kMostIncludes = 1000, kLongestText = std::size_t{1} << 28;
+
 bool isNameCharacter(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) || c == '_';
 }
@@ -72,7 +75,8 @@ bool equalButForCase(std::string_view a, std::string_view b) {
 std::optional<std::filesystem::path> entryOfSimilarName(const std::filesystem::path& folder, const std::string& name) {
   std::optional<std::filesystem::path> found;
   std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+  const std::filesystem::path place = folder.empty() ? "." : folder;
+  for (const auto& entry : std::filesystem::directory_iterator(place, error)) {
     if (!equalButForCase(entry.path().filename().string(), name)) continue;
     if (found) return std::nullopt;
     found = folder / entry.path().filename();
@@ -101,10 +105,11 @@ std::optional<std::filesystem::path> fileOfSimilarName(std::filesystem::path fol
 SceneFile::SceneFile(const std::filesystem::path& path, const std::map<std::string, std::string>& definitions,
                      Findings& findings)
     : findings_(findings),
-      files_{{path, readXmlText(path), 0}},
+      files_{{path, readXmlText(path), 0, {}}},
       text_(files_[0].text),
       segments_{{0, 0, 0}},
       values_(definitions) {
+  files_[0].lines = lineStarts(text_);
   do {
     parse();
     readDefaults();
@@ -180,6 +185,8 @@ bool SceneFile::expandInclude() {
   const std::size_t around = segmentAt(begin).file;
   try {
     const std::size_t file = addFile(include);
+    if (text_.size() + files_[file].text.size() > kLongestText)
+      fail(include, fmt::format("the file with all that it includes is longer than {} bytes", kLongestText));
     splice(begin, end, {file, bodyOf(file)});
   } catch (const SceneError& error) {
     for (const Fault& fault : error.faults())
@@ -192,6 +199,7 @@ bool SceneFile::expandInclude() {
 std::size_t SceneFile::addFile(pugi::xml_node include) {
   const pugi::xml_attribute name = include.attribute("filename");
   if (!name) fail(include, "<include> needs a filename");
+  if (files_.size() > kMostIncludes) fail(include, fmt::format("more than {} <include>s", kMostIncludes));
   const std::filesystem::path path = resolve(substituted(name.value(), include), location(include));
   if (!std::filesystem::is_regular_file(path)) fail(include, fmt::format("<include>: no file {}", path.string()));
   const std::size_t parent = segmentAt(static_cast<std::size_t>(location(include))).file;
@@ -200,7 +208,8 @@ std::size_t SceneFile::addFile(pugi::xml_node include) {
       fail(include, fmt::format("<include>: {} includes itself", path.string()));
     if (file == 0) break;
   }
-  files_.push_back({path, readXmlText(path), parent});
+  files_.push_back({path, readXmlText(path), parent, {}});
+  files_.back().lines = lineStarts(files_.back().text);
   return files_.size() - 1;
 }
 
@@ -261,6 +270,8 @@ std::string SceneFile::substituted(const std::string& text, pugi::xml_node node)
                         values_.empty() ? "" : fmt::format("; defined are {}", fmt::join(names(), ", "))),
             "the element is left out");
     result += it == values_.end() ? "$" + name : it->second;
+    if (result.size() > kLongestValue)
+      fail(node, fmt::format("with its $names replaced, a value is longer than {} characters", kLongestValue));
     usedNames_.insert(name);
     i = end;
   }
@@ -347,7 +358,7 @@ std::string SceneFile::where(std::ptrdiff_t location) const {
   const auto offset = static_cast<std::size_t>(std::max<std::ptrdiff_t>(location, 0));
   const Segment& segment = segmentAt(offset);
   const File& file = files_[segment.file];
-  return placeIn(file.path, file.text, segment.offset + (offset - segment.begin));
+  return placeIn(file.path, file.text, file.lines, segment.offset + (offset - segment.begin));
 }
 
 void SceneFile::fail(std::ptrdiff_t location, std::string_view message) const {

@@ -62,7 +62,8 @@ class SceneFile {
   struct File {
     std::filesystem::path path;
     std::string text;
-    std::size_t parent;  // the file that includes it; of the first, itself
+    std::size_t parent;              // the file that includes it; of the first, itself
+    std::vector<std::size_t> lines;  // where they begin in the text
   };
   /// From begin on, to where the next segment begins, the text is that of a file from offset on.
   struct Segment {

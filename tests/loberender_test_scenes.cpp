@@ -89,6 +89,15 @@ TEST_CASE("loberender: hide_emitters hides the lamp from the camera, not its lig
   CHECK(meanOf("3.0.0", hide + mirror) == Approx(3));
 }
 
+TEST_CASE("loberender: a file of similar name is found beside a scene that is named without its folder") {
+  const SceneFolder folder(false);
+  folder.write("Ball.xml", R"(<scene version="3.0.0"><shape type="sphere"/></scene>)");
+  folder.write("scene.xml", "<scene version=\"3.0.0\">" + sensor("") + R"(<include filename="ball.XML"/></scene>)");
+  const ToolRun run = folder.run("loberender --check scene.xml");
+  CHECK(run.code == 0);
+  CHECK_THAT(run.out, Catch::Contains("Ball.xml is taken for it"));
+}
+
 TEST_CASE("loberender and lobefit: --check reads, reports everything and renders nothing") {
   const SceneFolder folder(false);
   folder.write("scene.xml", "<scene version=\"3.0.0\">\n" + sensor("") + R"(<integrator type="volpath"/>

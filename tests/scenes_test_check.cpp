@@ -207,6 +207,42 @@ TEST_CASE("scenes: an encoding that is not known or not kept is a fault of the f
   CHECK_THAT(faultOfText(std::string("\xff\xfe<\0s\0\x00\xd8", 8)), Catch::Contains("this is not UTF-16LE"));
 }
 
+TEST_CASE("scenes: small files that would multiply without end are refused") {
+  const std::string sphere = "<shape type=\"sphere\"/>";
+  std::string values = "<default name=\"a0\" value=\"0123456789\"/>";
+  for (int i = 1; i < 40; ++i) values += fmt::format("<default name=\"a{}\" value=\"$a{}$a{}\"/>", i, i - 1, i - 1);
+  CHECK_THAT(faultOf(values + sphere), Catch::Contains("a value is longer than 1048576 characters"));
+
+  const auto chain = [&](const std::string& element, const std::string& type, const std::string& leaf, int references) {
+    std::string body = fmt::format("<{} type=\"{}\" id=\"e0\"/>", element, leaf);
+    for (int i = 1; i <= 30; ++i) {
+      body += fmt::format("<{} type=\"{}\" id=\"e{}\">", element, type, i);
+      for (int j = 0; j < references; ++j) body += fmt::format("<ref name=\"color{}\" id=\"e{}\"/>", j, i - 1);
+      body += fmt::format("</{}>", element);
+    }
+    return body + sphere;
+  };
+  CHECK_THAT(faultOf(chain("bsdf", "blendbsdf", "diffuse", 2)), Catch::Contains("more than 1000 bsdfs nested in one"));
+  CHECK_THAT(faultOf(chain("texture", "checkerboard", "checkerboard", 2)),
+             Catch::Contains("more than 1000 textures nested in one"));
+  CHECK(faultOf(chain("bsdf", "twosided", "diffuse", 1)).empty());
+
+  std::string deep;
+  for (int i = 0; i < 100000; ++i)
+    deep += fmt::format("<bsdf type=\"twosided\" id=\"e{}\"><ref id=\"e{}\"/></bsdf>\n", i, i + 1);
+  deep += "<bsdf type=\"diffuse\" id=\"e100000\"/>";
+  CHECK_THAT(faultOf(deep + sphere), Catch::Contains("nested more than 100 deep"));
+
+  const TestFolder folder;
+  for (int i = 0; i < 40; ++i)
+    folder.write(
+        fmt::format("{}.xml", i),
+        fmt::format("<scene version=\"3.0.0\"><include filename=\"{0}.xml\"/><include filename=\"{0}.xml\"/></scene>",
+                    i + 1));
+  folder.write("40.xml", "<scene version=\"3.0.0\"/>");
+  CHECK_THROWS_WITH(readScene(folder.path() / "0.xml"), Catch::Contains("more than 1000 <include>s"));
+}
+
 TEST_CASE("scenes: integrators say how long paths are and whether emitters are seen") {
   const auto read = [](const std::string& version, const std::string& integrator) {
     return readText("<scene version=\"" + version + "\">" + integrator + kSensor + "</scene>");

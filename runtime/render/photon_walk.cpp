@@ -9,6 +9,8 @@ namespace {
 constexpr float kLowestWeight = 1e-6f;
 constexpr float kHighestWeight = 2 + kLowestWeight;
 constexpr int kMaxWaiting = 64;  // of one photon that wait at a time
+// Of one photon in all. Surfaces that return more light than they receive would split it without end.
+constexpr int kMaxBranchesOfPhoton = 4096;
 
 /// What BSDF sampling is left with where emitter sampling finds the same light (nothing of a delta light's); a cosine
 /// stands for the density to come.
@@ -28,6 +30,7 @@ void PhotonWalk::run(const EmittedPhoton& photon) {
   power_ = luminance(photon.power);
   if (!usable(power_)) return;
   waiting_.push_back({{photon.ray, photon.power}, 1});
+  made_ = 0;
   while (!waiting_.empty()) {
     const Branch branch = waiting_.back();
     waiting_.pop_back();
@@ -75,8 +78,9 @@ int PhotonWalk::applyWeightWindow(Rgb& weight) {
     return rng_.uniform() * kLowestWeight < relative ? 1 : 0;
   }
   if (relative <= kHighestWeight) return 1;
-  const int room = std::max(1, kMaxWaiting - static_cast<int>(waiting_.size()));
+  const int room = std::max(1, std::min(kMaxWaiting - static_cast<int>(waiting_.size()), kMaxBranchesOfPhoton - made_));
   const int branches = std::min(static_cast<int>(std::min(relative / 2, 1e3f)) + 1, room);
+  made_ += branches;
   weight /= static_cast<float>(branches);
   return branches;
 }

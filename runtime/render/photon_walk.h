@@ -37,6 +37,7 @@ class PhotonWalk {
   PhotonResult& result_;
   float power_ = 0;  // emitted, luminance
   std::vector<Branch> waiting_;
+  int made_ = 0;  // branches by splitting
 };
 
 }  // namespace lobe
