@@ -10,7 +10,7 @@ constexpr float kLowestWeight = 1e-6f;
 constexpr float kHighestWeight = 2 + kLowestWeight;
 constexpr int kMaxWaiting = 64;  // of one photon that wait at a time
 // Of one photon in all. Surfaces that return more light than they receive would split it without end.
-constexpr int kMaxBranchesOfPhoton = 4096;
+constexpr int kMaxBranchesOfPhoton = 512;
 
 /// What BSDF sampling is left with where emitter sampling finds the same light (nothing of a delta light's); a cosine
 /// stands for the density to come.
