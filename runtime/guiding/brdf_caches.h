@@ -7,19 +7,13 @@
 #include <string>
 #include <vector>
 
+#include "lobe/cache_set.h"
 #include "runtime/guiding/reflectance.h"
 #include "runtime/mixture/grid.h"
 #include "runtime/mixture/lanes.h"
 #include "schema/lobe_cache.h"
 
 namespace lobe {
-
-/// A lobe that some material has, and so a cache file that is needed.
-struct LobeRequest {
-  std::string model, key;  ///< as the lobe says
-  int revision;
-  std::string material;  ///< for messages
-};
 
 class BrdfCaches {
  public:

@@ -9,6 +9,7 @@
 
 #include <optional>
 
+#include "lobe/surface_distribution.h"
 #include "runtime/guiding/illumination_cache.h"
 #include "runtime/guiding/reflectance.h"
 #include "runtime/mixture/product.h"
@@ -30,8 +31,6 @@ inline StrategyShares productShares(float bsdf) {
 }
 /// Vorba et al. 2014.
 inline constexpr StrategyShares kGuidedShares{0.0f, 0.5f, 0.5f};
-
-enum class Strategy { bsdf, product, illumination };
 
 class GuidedDensity {
  public:

@@ -103,7 +103,7 @@ void IlluminationTrainer::fill(std::span<const std::span<const Particle>> source
 
 void IlluminationTrainer::learnShares(std::span<const ShareSample> samples) {
   std::vector<std::vector<ShareSample>> ofRecord(records_.size());
-  for (const ShareSample& s : samples) ofRecord[cache_.indexOf(*s.record)].push_back(s);
+  for (const ShareSample& s : samples) ofRecord[s.record].push_back(s);
   parallelFor(std::size_t{0}, records_.size(), [&](std::size_t i) { records_[i].share.learn(ofRecord[i]); });
 }
 

@@ -15,11 +15,11 @@ inline constexpr float kLeastBsdfShare = 0.05f;
 
 /// One direction that a path took at a vertex. Densities over solid angle.
 struct ShareSample {
-  const PackedRecord* record;  ///< that served the vertex
-  float bsdf;                  ///< the BSDF's density of the direction
-  float mixtures;              ///< that of product and illumination, in the ratio of kProductShares
-  float covered;               ///< share of samples that BSDF and mixtures divide; the others are the BSDF's; in (0,1]
-  float weight = 0;            ///< f L cosθ over the density that it was drawn by, luminance
+  std::size_t record;  ///< that served the vertex: its index in the cache
+  float bsdf;          ///< the BSDF's density of the direction
+  float mixtures;      ///< that of product and illumination, in the ratio of kProductShares
+  float covered;       ///< share of samples that BSDF and mixtures divide; the others are the BSDF's; in (0,1]
+  float weight = 0;    ///< f L cosθ over the density that it was drawn by, luminance
 };
 
 class SelectionShare {

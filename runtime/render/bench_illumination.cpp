@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "runtime/core/parallel.h"
+#include "runtime/guiding/field_data.h"
 #include "runtime/render/bench_training.h"
 #include "runtime/render/received_light.h"
 
@@ -51,7 +52,7 @@ struct Exam {
 
 /// Photons of another seed, of the environment where importons ask for them, but guided by nothing that was learnt.
 std::vector<Particle> heldOutParticles(const RenderScene& scene, const RayCamera& camera, const Options& o) {
-  const IlluminationCache nothing;
+  const Field nothing;
   const GuidedSampler sampler(scene.scene, nothing, nullptr);
   std::optional<EnvironmentGuide> guide;
   if (scene.lights.environmentProbability() > 0) guide.emplace(scene.lights);
@@ -64,7 +65,7 @@ std::vector<Particle> heldOutParticles(const RenderScene& scene, const RayCamera
   return tracer.tracePhotons(0, o.heldOutPhotons).particles;
 }
 
-Exam makeExam(const RenderScene& scene, const RayCamera& camera, const Options& o, const IlluminationCache& best) {
+Exam makeExam(const RenderScene& scene, const RayCamera& camera, const Options& o, const Field& best) {
   Exam exam;
   exam.receivers = receiversOfPaths(scene, camera, o.receivers, kHeldOutSeed);
   const std::vector<Particle> particles = heldOutParticles(scene, camera, o);
@@ -81,7 +82,7 @@ Exam makeExam(const RenderScene& scene, const RayCamera& camera, const Options& 
         particlesAround(receiver, particles, static_cast<std::size_t>(o.plan.records.neighbours), reach);
     ReceivedLightOptions options;
     options.seed = kHeldOutSeed;
-    exam.light[i] = ReceivedLight(scene, paths, receiver, ServedDensity(best, receiver), options, i);
+    exam.light[i] = ReceivedLight(scene, paths, receiver, ServedDensity(cacheOf(best), receiver), options, i);
   });
   return exam;
 }
@@ -129,11 +130,11 @@ std::string nameOf(TrainFrom from) {
 
 nlohmann::ordered_json row(const Exam& exam, const Trained& trained) {
   nlohmann::ordered_json json{{"train", nameOf(trained.from)}, {"passes", trained.passes}};
-  json.update(grade(exam, trained.illumination.cache));
+  json.update(grade(exam, cacheOf(trained.illumination.field)));
   json["processor_seconds"] = trained.seconds;
   json["particles"] = trained.illumination.report.particles();
-  json["records"] = trained.illumination.cache.size();
-  json["record_bytes"] = trained.illumination.cache.bytes();
+  json["records"] = trained.illumination.field.records();
+  json["record_bytes"] = trained.illumination.field.bytes();
   return json;
 }
 
@@ -160,7 +161,7 @@ void run(Options& o) {
       progress.advance();
     }
   }
-  const Exam exam = makeExam(renderScene, camera, o, trainings.back().illumination.cache);
+  const Exam exam = makeExam(renderScene, camera, o, trainings.back().illumination.field);
   progress.advance();
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
   for (const Trained& trained : trainings) rows.push_back(row(exam, trained));

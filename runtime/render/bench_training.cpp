@@ -15,7 +15,7 @@ void BenchTraining::declare(CLI::App& app) {
   app.add_option("--photons", plan.photons, "Photons a pass")->check(CLI::PositiveNumber)->capture_default_str();
   app.add_option("--importons", plan.importons, "Importons a pass")->check(CLI::PositiveNumber)->capture_default_str();
   app.add_option("--components", plan.records.components, "Gaussians of a record, 1 to 8")
-      ->check(CLI::Range(1, kMaxLightComponents))
+      ->check(CLI::Range(1, FieldOptions::kMostComponents))
       ->capture_default_str();
   app.add_option("--seed", plan.seed, "Of the training")->capture_default_str();
   app.add_flag("--lenient", read.lenient, "Pass over what the reader does not know");

@@ -16,6 +16,7 @@
 
 #include "materials/sampling.h"
 #include "runtime/core/parallel.h"
+#include "runtime/guiding/field_data.h"
 #include "runtime/render/bench_training.h"
 #include "runtime/render/received_light.h"
 
@@ -70,9 +71,9 @@ std::vector<SurfaceHit> verticesOfPaths(const RenderScene& scene, const RayCamer
 
 /// Mixtures of both factors, merged up to a cost.
 struct ReducedFactors {
-  ReducedFactors(const Options& o, const Scene& scene, const IlluminationCache& trained, double cost)
+  ReducedFactors(const Options& o, const Scene& scene, const Field& trained, double cost)
       : threshold(cost),
-        illumination(cost > 0 ? reduced(trained, static_cast<float>(cost)) : trained),
+        illumination(cost > 0 ? trained.reduced(static_cast<float>(cost)) : trained),
         caches(o.cacheFolder, lobeRequests(scene), fmt::format("lobefit {} -o {}", o.scene, o.cacheFolder),
                static_cast<float>(cost)),
         sampler(scene, illumination, &caches) {}
@@ -80,16 +81,16 @@ struct ReducedFactors {
   ReducedFactors& operator=(const ReducedFactors&) = delete;
 
   double threshold;
-  IlluminationCache illumination;
-  BrdfCaches caches;
+  Field illumination;
+  LobeCacheSet caches;
   GuidedSampler sampler;
 };
 
 /// The records without the shares that they have learnt.
-IlluminationCache withFixedShares(const IlluminationCache& cache) {
-  std::vector<IlluminationRecord> records = cache.records();
+Field withFixedShares(const Field& field) {
+  std::vector<IlluminationRecord> records = cacheOf(field).records();
   for (IlluminationRecord& r : records) r.bsdfShare = kProductShares.bsdf;
-  return {records, cache.unit()};
+  return fieldOf({records, cacheOf(field).unit()});
 }
 
 /// All that vertices are examined with.
@@ -215,7 +216,7 @@ class Reshared {
       : product_(product), hit_(hit), light_(light) {}
 
   double pdf(const Vec3& wi, double share) const {
-    const double own = product_.bsdfShare(), bsdf = hit_.bsdf->pdf(hit_.wo, wi, hit_.uv);
+    const double own = product_.distribution().bsdfProbability(), bsdf = hit_.bsdf->pdf(hit_.wo, wi, hit_.uv);
     return share * bsdf + (1 - share) * std::max(0.0, product_.pdf(wi) - own * bsdf) / (1 - own);
   }
   std::optional<double> nev(double share) const {
@@ -250,7 +251,10 @@ Grade gradeVertex(const Laboratory& lab, const std::deque<ReducedFactors>& reduc
     return light.nev([&](const Vec3& wi) { return vertex.pdf(wi); });
   };
   const GuidedSampler::Vertex product(lab.product, hit);
-  Grade grade{.decision = product.decision(), .nevs = {}, .share = product.bsdfShare(), .bestShare = 1};
+  Grade grade{.decision = product.distribution().decision(),
+              .nevs = {},
+              .share = product.distribution().bsdfProbability(),
+              .bestShare = 1};
   const auto bsdf = light.nev([&](const Vec3& wi) { return hit.bsdf->pdf(hit.wo, wi, hit.uv); });
   if (!bsdf) return grade;
   grade.nevs = {*bsdf, *nev(lab.guided), *nev(lab.product), *nev(lab.fixedShares)};
@@ -321,12 +325,13 @@ void run(Options& o) {
   const Scene scene = o.readScene();
   const RenderScene renderScene(scene);
   const RayCamera camera(scene.camera, scene.filter);
-  const BrdfCaches caches(o.cacheFolder, lobeRequests(scene), fmt::format("lobefit {} -o {}", o.scene, o.cacheFolder));
+  const LobeCacheSet caches(o.cacheFolder, lobeRequests(scene),
+                            fmt::format("lobefit {} -o {}", o.scene, o.cacheFolder));
   const TrainedIllumination trained = trainIllumination(renderScene, camera, &caches, o.plan);
   std::deque<ReducedFactors> reductions;
-  for (const double threshold : o.reductions) reductions.emplace_back(o, scene, trained.cache, threshold);
-  const GuidedSampler guided(scene, trained.cache, nullptr), product(scene, trained.cache, &caches);
-  const IlluminationCache withoutShares = withFixedShares(trained.cache);
+  for (const double threshold : o.reductions) reductions.emplace_back(o, scene, trained.field, threshold);
+  const GuidedSampler guided(scene, trained.field, nullptr), product(scene, trained.field, &caches);
+  const Field withoutShares = withFixedShares(trained.field);
   const GuidedSampler fixedShares(scene, withoutShares, &caches);
   const GuidedIntegrator paths(renderScene, {}, product);
   const std::vector<SurfaceHit> vertices = verticesOfPaths(renderScene, camera, product, o.vertices);

@@ -1,5 +1,10 @@
 #include "runtime/render/guided_integrator.h"
 
+#include <array>
+#include <span>
+
+#include "runtime/render/public_types.h"
+
 namespace lobe {
 namespace {
 
@@ -14,37 +19,11 @@ SamplingStrategy asCounted(Strategy strategy) {
   }
 }
 
-float sideOf(const SurfaceHit& hit) {
-  return hit.wo.z() >= 0 ? 1.0f : -1.0f;
+ShadingPoint pointOf(const SurfaceHit& hit) {
+  const Frame& frame = hit.frame;
+  return {asFloats(hit.position), asFloats(hit.normal), asFloats(frame.s),
+          asFloats(frame.t),      asFloats(frame.n),    asFloats(hit.wo)};
 }
-
-/// The frame in which both factors of the product are given, as seen from the shading frame: z is the shading normal on
-/// the side of wo, x the record's tangent made orthogonal to it. So records need no turning on flat surfaces.
-Eigen::Matrix3f guideAxes(const SurfaceHit& hit, const PackedRecord& record, float side) {
-  const Vec3 tangent = hit.frame.toLocal(record.tangent);
-  const float length = tangent.head<2>().norm();
-  const Vec2 x = length > 1e-4f ? Vec2(tangent.head<2>() / length) : Vec2(Vec2::UnitX());
-  Eigen::Matrix3f axes;
-  axes << x.x(), x.y(), 0, -side * x.y(), side * x.x(), 0, 0, 0, side;
-  return axes;
-}
-
-/// Samples for what the mixtures do not know are the BSDF's: light that goes through the surface, lobes too narrow.
-StrategyShares onCovered(const StrategyShares& shares, float covered) {
-  return {covered * shares.product, 1 - covered * (shares.product + shares.illumination),
-          covered * shares.illumination};
-}
-
-/// The share of reflection that the mixtures describe.
-float coveredShare(const Reflectance& reflectance) {
-  const float all = reflectance.albedo + reflectance.uncoveredAlbedo;
-  return all > 0 ? reflectance.albedo / all : 1.0f;
-}
-
-// Records that have seen less than five particles for each of eight components know little, and light of which less
-// than this share has a shape is sampled by the BSDF as well as by a product.
-constexpr float kUndersampled = 40;
-constexpr float kEvenBackground = 0.98f;
 
 }  // namespace
 
@@ -56,8 +35,8 @@ std::vector<LobeRequest> lobeRequests(const Scene& scene) {
   return requests;
 }
 
-GuidedSampler::GuidedSampler(const Scene& scene, const IlluminationCache& illumination, const BrdfCaches* caches)
-    : illumination_(illumination), caches_(caches) {
+GuidedSampler::GuidedSampler(const Scene& scene, const Field& field, const LobeCacheSet* caches)
+    : field_(field), caches_(caches) {
   int next = 0;
   for (const Material& material : scene.materials) {
     firstRequest_.push_back(next);
@@ -66,87 +45,49 @@ GuidedSampler::GuidedSampler(const Scene& scene, const IlluminationCache& illumi
 }
 
 GuidedSampler::Vertex::Vertex(const GuidedSampler& sampler, const SurfaceHit& hit)
-    : hit_(hit), record_(sampler.illumination_.find(hit.position, sideOf(hit) * hit.normal)) {
-  if (!record_) return;
-  const float side = sideOf(hit);
-  axes_ = guideAxes(hit, *record_, side);
+    : sampler_(sampler), hit_(hit), distribution_(sampler.field_, pointOf(hit)) {
+  if (!distribution_.hasRecord()) return;
   const LobeMixture mixture = hit.bsdf->mixture(hit.wo, hit.uv);
-  described_ = mixture.undescribedShare <= 0;
-  product_ = sampler.caches_ != nullptr;
-  if (product_) collectReflectance(sampler, hit, mixture, side);
-  covered_ = (1 - mixture.undescribedShare) * coveredShare(reflectance_);
-  decision_ = decide();
-  const bool halves = !product_ || decision_ == GuidingDecision::undersampled;
-  if (decision_ != GuidingDecision::narrow && decision_ != GuidingDecision::even)
-    density_.emplace(reflectance_, *record_,
-                     onCovered(halves ? kGuidedShares : productShares(record_->bsdfShare), covered_));
-}
-
-GuidingDecision GuidedSampler::Vertex::decide() const {
-  if (covered_ <= 0) return GuidingDecision::narrow;
-  if (!product_) return GuidingDecision::illumination;
-  if (record_->samples < kUndersampled) return GuidingDecision::undersampled;
-  if (record_->background > kEvenBackground) return GuidingDecision::even;
-  return reflectance_.gaussians.count() > 0 ? GuidingDecision::product : GuidingDecision::illumination;
-}
-
-void GuidedSampler::Vertex::collectReflectance(const GuidedSampler& sampler, const SurfaceHit& hit,
-                                               const LobeMixture& mixture, float side) {
-  reflectance_.constant = mixture.constant * kInvPi;
-  reflectance_.backgroundMass = reflectance_.constant;
-  reflectance_.albedo = mixture.constant;
-  // On the back, lobes see the frame (s, −t, −n). The lobes we have are symmetric in t, so that this is theirs as well
-  // as the mirrored (s, t, −n) of two-sided materials; for another lobe the density would be worse, not wrong.
-  const Vec3 wo(hit.wo.x(), side * hit.wo.y(), side * hit.wo.z());
-  const Vec2 turn(axes_(0, 0), axes_(1, 0));
   const int first = sampler.firstRequest_[hit.material];
-  for (int i = 0; i < mixture.glossyCount; ++i)
-    if (mixture.glossy[i].tint > 0)
-      sampler.caches_->add(first + mixture.glossy[i].lobe, wo, turn, mixture.glossy[i].tint, reflectance_);
+  std::array<TintedLobe, kMaxLobes> lobes;
+  for (int i = 0; i < mixture.glossyCount; ++i) lobes[i] = {first + mixture.glossy[i].lobe, mixture.glossy[i].tint};
+  distribution_.describe({std::span<const TintedLobe>(lobes.data(), static_cast<std::size_t>(mixture.glossyCount)),
+                          mixture.constant, mixture.undescribedShare},
+                         sampler.caches_);
 }
 
 std::optional<BsdfSample> GuidedSampler::Vertex::sample(Rng& rng, PathStatistics& statistics) const {
   float choice = rng.uniform();
   const Vec2 u = rng.uniform2();
-  const Strategy strategy = density_ ? density_->choose(choice) : Strategy::bsdf;
+  const Strategy strategy = distribution_.choose(choice);
   statistics.count(asCounted(strategy));
-  statistics.count(decision_);
+  statistics.count(distribution_.decision());
+  const float bsdfProbability = distribution_.bsdfProbability();
   if (strategy == Strategy::bsdf) {
     std::optional<BsdfSample> sample = sampleBsdf(hit_, choice, u);
-    if (sample && density_)
-      sample->pdf = density_->bsdfShare() * sample->pdf + density_->guidedPdf(toGuide(sample->wi));
+    if (sample && bsdfProbability < 1)
+      sample->pdf = bsdfProbability * sample->pdf + distribution_.guidedPdf(asFloats(sample->wi));
     return sample;
   }
-  const std::optional<Vec3> guide = density_->sample(strategy, choice, u);
-  if (!guide) return std::nullopt;
-  const Vec3 wi = axes_.transpose() * *guide;
+  const std::optional<GuidedSample> guided = distribution_.sample(strategy, choice, {u.x(), u.y()});
+  if (!guided) return std::nullopt;
+  const Vec3 wi(guided->wi.x, guided->wi.y, guided->wi.z);
   const Rgb f = evalBsdf(hit_, wi);
   if (!(f.maxCoeff() > 0)) return std::nullopt;
-  return BsdfSample{wi, f, density_->bsdfShare() * hit_.bsdf->pdf(hit_.wo, wi, hit_.uv) + density_->guidedPdf(*guide)};
+  return BsdfSample{wi, f, bsdfProbability * hit_.bsdf->pdf(hit_.wo, wi, hit_.uv) + guided->guidedPdf};
 }
 
 float GuidedSampler::Vertex::pdf(const Vec3& wi) const {
   const float bsdf = hit_.bsdf->pdf(hit_.wo, wi, hit_.uv);
-  return density_ ? density_->bsdfShare() * bsdf + density_->guidedPdf(toGuide(wi)) : bsdf;
-}
-
-std::optional<ShareSample> GuidedSampler::Vertex::shareSample(const Vec3& wi) const {
-  if (decision_ != GuidingDecision::product && !(product_ && decision_ == GuidingDecision::illumination))
-    return std::nullopt;
-  const float bsdf = hit_.bsdf->pdf(hit_.wo, wi, hit_.uv);
-  const float divided = covered_ * (1 - record_->bsdfShare);  // the mixtures' with the background that is the BSDF's
-  const float background = density_->bsdfShare() - (1 - divided);
-  const float mixtures = (std::max(0.0f, background) * bsdf + density_->guidedPdf(toGuide(wi))) / divided;
-  return ShareSample{record_, bsdf, mixtures, covered_};
+  const float probability = distribution_.bsdfProbability();
+  return probability < 1 ? probability * bsdf + distribution_.guidedPdf(asFloats(wi)) : bsdf;
 }
 
 std::optional<float> GuidedSampler::Vertex::reflectedRadiance() const {
-  // Nothing is known of light that comes through the surface, nor of what lobes without a fit reflect.
-  if (!record_ || !(record_->irradiance > 0) || hit_.bsdf->transmits() || !described_) return std::nullopt;
-  const float diffuse = product_ ? reflectance_.uncoveredAlbedo : luminance(hit_.bsdf->albedo(hit_.wo, hit_.uv));
-  if (!product_) return record_->irradiance * diffuse * kInvPi;
-  const bool shaped = decision_ == GuidingDecision::product || decision_ == GuidingDecision::illumination;
-  return record_->irradiance * (diffuse * kInvPi + (shaped ? density_->reflected() : reflectance_.backgroundMass));
+  // Nothing is known of light that comes through the surface.
+  if (!distribution_.hasRecord() || hit_.bsdf->transmits()) return std::nullopt;
+  const float albedo = sampler_.caches_ ? 0.0f : luminance(hit_.bsdf->albedo(hit_.wo, hit_.uv));
+  return distribution_.reflectedRadiance(albedo);
 }
 
 Rgb GuidedIntegrator::radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const {

@@ -23,31 +23,21 @@ Passage passageToEnvironment(const RayTracer& tracer, const SurfacePoint& from, 
   return Passage::blocked;
 }
 
-Vec3 normalTowards(const SurfacePoint& point, const Vec3& direction) {
-  return std::copysign(1.0f, point.normal.dot(direction)) * point.normal;
-}
-
 }  // namespace
 
-void ImportonWalk::run(const Ray& cameraRay) {
+void ImportonWalk::run(const Ray& cameraRay, std::uint64_t index) {
+  recorder_.begin(index);
+  result_.importance.beginPath(index);
   flight_ = {cameraRay, Rgb::Ones()};
   for (depth_ = 1; depth_ <= kMaxTrainingDepth; ++depth_)
     if (!advance()) break;
-  for (int i = 0; i < count_; ++i) {
-    Particle& particle = vertices_[i].particle;
-    particle.weight *= vertices_[i].radiance;
-    if (wishes_.samples && usable(particle.weight)) result_.samples.push_back(particle);
-    if (std::optional<ShareSample>& share = vertices_[i].share) {
-      share->weight *= vertices_[i].radiance;
-      if (usable(share->weight)) result_.shares.push_back(*share);
-    }
-  }
+  recorder_.end();
 }
 
 // One segment and what happens at its end; false: the path is over.
 bool ImportonWalk::advance() {
   const std::optional<SurfaceHit> hit = scene_.tracer.trace(flight_.ray);
-  if (awaitsDistance_) vertices_[count_ - 1].particle.distance = hit ? hit->distance : kInfinity;
+  if (awaitsDistance_) recorder_.setDistance(hit ? hit->distance : kInfinity);
   awaitsDistance_ = false;
   if (!hit) {
     escape();
@@ -65,7 +55,8 @@ bool ImportonWalk::advance() {
   const float delta = hit->bsdf->deltaProbability(hit->wo, hit->uv);
   if (delta < 1) {
     vertex.emplace(sampler_, *hit);
-    if (!vertex->hasRecord()) result_.requests.push_back({hit->position, normalTowards(*hit)});
+    if (!vertex->distribution().hasRecord())
+      result_.radiance.requestRecord(asFloats(hit->position), asFloats(normalTowards(*hit)));
     arrive(*hit);
     addDirectLight(*hit, *vertex, 1 - delta);
   }
@@ -82,8 +73,8 @@ bool ImportonWalk::advance() {
 // What comes straight from the camera, or by mirrors only, guides no photon: it would end in the lens.
 void ImportonWalk::arrive(const SurfaceHit& hit) {
   if (wishes_.importance && scattered_)
-    result_.importance.push_back(
-        {hit.position, normalTowards(hit), hit.woWorld, luminance(flight_.weight), hit.distance});
+    result_.importance.addPhoton(asFloats(hit.position), asFloats(normalTowards(hit)), asFloats(hit.woWorld),
+                                 luminance(flight_.weight), hit.distance, 0);
 }
 
 // Light that the camera sees directly needs no photons; that of first surfaces is shared with emitter sampling.
@@ -120,22 +111,19 @@ void ImportonWalk::addEnvironmentLight(const SurfaceHit& hit, const Vec3& wi, co
   result_.uses.push_back({hit.position, wi, luminance(light) * (passage == Passage::free ? weight : 1.0f)});
 }
 
-// Light that reached the camera also passed every vertex before: there it is the radiance that arrived from the next.
-void ImportonWalk::collect(const Rgb& light) {
-  for (int i = 0; i < count_; ++i)
-    vertices_[i].radiance += luminance((vertices_[i].carried > 0).select(light / vertices_[i].carried, Rgb::Zero()));
-}
-
 void ImportonWalk::remember(const SurfaceHit& hit, const GuidedSampler::Vertex& vertex, const Scattered& scattered) {
   scattered_ = true;
   if (!wishes_.samples && !wishes_.shares) return;
-  const Vec3 normal = normalTowards(hit, scattered.direction);
-  const float cosine = normal.dot(scattered.direction);
-  Vertex& last = vertices_[count_++];
-  last = {.particle = {hit.position, normal, scattered.direction, cosine / scattered.pdf, kInfinity},
-          .carried = flight_.weight,
-          .share = wishes_.shares ? vertex.shareSample(scattered.wi) : std::nullopt};
-  if (last.share) last.share->weight = luminance(scattered.weight);
+  const bool learnsFraction = wishes_.shares && vertex.distribution().learnsFraction();
+  recorder_.addVertex({.position = asFloats(hit.position),
+                       .normal = asFloats(hit.normal),
+                       .direction = asFloats(scattered.direction),
+                       .wi = asFloats(scattered.wi),
+                       .pdf = scattered.pdf,
+                       .bsdfPdf = learnsFraction ? hit.bsdf->pdf(hit.wo, scattered.wi, hit.uv) : 0,
+                       .weight = asFloats(scattered.weight),
+                       .throughput = asFloats(flight_.weight)},
+                      &vertex.distribution());
   awaitsDistance_ = true;
 }
 

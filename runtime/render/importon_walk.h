@@ -2,12 +2,13 @@
 // One path from the camera in training. It says where records are needed, where photons of the environment should
 // start, how important light is that travels against it, and what light it found itself.
 
-#include <array>
+#include <cstdint>
 #include <vector>
 
-#include "runtime/guiding/particle.h"
+#include "lobe/path_recorder.h"
 #include "runtime/render/camera.h"
 #include "runtime/render/particle_flight.h"
+#include "runtime/render/public_types.h"
 
 namespace lobe {
 
@@ -19,11 +20,9 @@ struct EnvironmentUse {
 };
 
 struct ImportonResult {
-  std::vector<RecordRequest> requests;
+  SampleStorage radiance;    ///< incident light that the paths found, and requests for records of it
+  SampleStorage importance;  ///< what arrived from the camera after a first scattering, as photons
   std::vector<EnvironmentUse> uses;
-  std::vector<Particle> importance;  ///< what arrived from the camera after a first scattering
-  std::vector<Particle> samples;    ///< incident light that the path found: weight L cosθ over the direction's density
-  std::vector<ShareSample> shares;  ///< of the vertices that the product was sampled at
 };
 
 /// What to spend time on.
@@ -39,23 +38,23 @@ class ImportonWalk {
   /// All outlive it; the walk appends to the result.
   ImportonWalk(const RenderScene& scene, const GuidedSampler& sampler, const ImportonWishes& wishes, Rng& rng,
                ImportonResult& result)
-      : scene_(scene), sampler_(sampler), wishes_(wishes), rng_(rng), result_(result) {}
+      : scene_(scene),
+        sampler_(sampler),
+        wishes_(wishes),
+        rng_(rng),
+        result_(result),
+        recorder_(result.radiance, {wishes.samples, wishes.shares}) {}
 
-  void run(const Ray& cameraRay);
+  /// index: of the path, told to the storages.
+  void run(const Ray& cameraRay, std::uint64_t index);
 
  private:
-  struct Vertex {
-    Particle particle;  // its weight still without the radiance
-    Rgb carried;        // the flight's weight behind this vertex, before Russian roulette
-    float radiance = 0;
-    std::optional<ShareSample> share;  // its weight without the radiance as well
-  };
   bool advance();
   void arrive(const SurfaceHit& hit);
   void escape();
   void addDirectLight(const SurfaceHit& hit, const GuidedSampler::Vertex& vertex, float smoothShare);
   void addEnvironmentLight(const SurfaceHit& hit, const Vec3& wi, const Rgb& light, float weight);
-  void collect(const Rgb& light);
+  void collect(const Rgb& light) { recorder_.addLight(asFloats(light)); }
   void remember(const SurfaceHit& hit, const GuidedSampler::Vertex& vertex, const Scattered& scattered);
 
   const RenderScene& scene_;
@@ -70,8 +69,7 @@ class ImportonWalk {
   bool scattered_ = false;       // not by delta parts alone
   bool awaitsDistance_ = false;  // of the last vertex
   Vec3 previous_ = Vec3::Zero();
-  std::array<Vertex, kMaxTrainingDepth> vertices_;
-  int count_ = 0;
+  PathRecorder recorder_;
 };
 
 }  // namespace lobe

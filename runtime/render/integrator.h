@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 
+#include "lobe/surface_distribution.h"
 #include "runtime/mixture/random.h"
 #include "runtime/render/ray.h"
 
@@ -13,10 +14,7 @@ namespace lobe {
 enum class SamplingStrategy { bsdf, product, illumination, delta };
 inline constexpr std::array<const char*, 4> kSamplingStrategyNames{"bsdf", "product", "illumination", "delta"};
 
-/// What a guided sampler made of a vertex: the product; the illumination mixture as it is, where reflection is constant
-/// or no product was asked for; the two halves of a record that has seen too little; or the BSDF alone, where what it
-/// reflects has no mixture (lobes next to a mirror), light is even, or there is no record.
-enum class GuidingDecision { product, illumination, undersampled, narrow, even, noRecord };
+/// In the order of GuidingDecision.
 inline constexpr std::array<const char*, 6> kGuidingDecisionNames{"product", "illumination", "undersampled",
                                                                   "narrow",  "even",         "no_record"};
 

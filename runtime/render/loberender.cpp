@@ -50,7 +50,7 @@ void declareTraining(CLI::App& app, Options& options) {
   app.add_option("--photons", plan.photons, "Photons a pass")->check(CLI::PositiveNumber)->capture_default_str();
   app.add_option("--importons", plan.importons, "Importons a pass")->check(CLI::PositiveNumber)->capture_default_str();
   app.add_option("--components", plan.records.components, "Gaussians of an illumination record, 1 to 8")
-      ->check(CLI::Range(1, kMaxLightComponents))
+      ->check(CLI::Range(1, FieldOptions::kMostComponents))
       ->capture_default_str();
   app.add_option("--shares", options.shares,
                  "How often product leaves a direction to the BSDF: learnt (by each record) or fixed")

@@ -6,8 +6,10 @@ namespace lobe {
 namespace {
 
 constexpr int kChunk = 1024;
+// Photons come after importons in the order of paths.
+constexpr std::uint64_t kFirstPhoton = std::uint64_t{1} << 32;
 
-/// Runs trace(rng, result) `count` times in chunks that any thread may take; the results come in order.
+/// Runs trace(i, rng, result) for i below count, in chunks that any thread may take; the results come in order.
 template <class Result, class Trace>
 std::vector<Result> traceChunks(std::uint64_t seed, std::uint64_t stream, int count, const Trace& trace) {
   const int chunks = (count + kChunk - 1) / kChunk;
@@ -15,21 +17,10 @@ std::vector<Result> traceChunks(std::uint64_t seed, std::uint64_t stream, int co
   parallelFor(0, chunks, [&](int chunk) {
     for (int i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
       Rng rng(seed, stream, i);
-      trace(rng, results[chunk]);
+      trace(i, rng, results[chunk]);
     }
   });
   return results;
-}
-
-/// One part of all results, put together in order.
-template <class Result, class T>
-std::vector<T> joined(const std::vector<Result>& results, std::vector<T> Result::*part) {
-  std::size_t size = 0;
-  for (const Result& r : results) size += (r.*part).size();
-  std::vector<T> all;
-  all.reserve(size);
-  for (const Result& r : results) all.insert(all.end(), (r.*part).begin(), (r.*part).end());
-  return all;
 }
 
 }  // namespace
@@ -39,27 +30,36 @@ ParticleTracer::ParticleTracer(const RenderScene& scene, const RayCamera& camera
     : scene_(scene), camera_(camera), radiance_(radiance), importance_(importance), guide_(guide), seed_(seed) {}
 
 ImportonResult ParticleTracer::traceImportons(int pass, int count, const ImportonWishes& wishes) const {
-  const auto results = traceChunks<ImportonResult>(
-      seed_, 2 * static_cast<std::uint64_t>(pass), count, [&](Rng& rng, ImportonResult& result) {
+  auto results = traceChunks<ImportonResult>(
+      seed_, 2 * static_cast<std::uint64_t>(pass), count, [&](int i, Rng& rng, ImportonResult& result) {
         const Vec2 pixel = rng.uniform2();
         const int x = static_cast<int>(pixel.x() * static_cast<float>(camera_.width()));
         const int y = static_cast<int>(pixel.y() * static_cast<float>(camera_.height()));
         const Ray ray = camera_.sample(x, y, rng);
-        ImportonWalk(scene_, radiance_, wishes, rng, result).run(ray);
+        ImportonWalk(scene_, radiance_, wishes, rng, result).run(ray, static_cast<std::uint64_t>(i));
       });
-  return {joined(results, &ImportonResult::requests), joined(results, &ImportonResult::uses),
-          joined(results, &ImportonResult::importance), joined(results, &ImportonResult::samples),
-          joined(results, &ImportonResult::shares)};
+  ImportonResult all;
+  for (ImportonResult& result : results) {
+    all.radiance.merge(std::move(result.radiance));
+    all.importance.merge(std::move(result.importance));
+    all.uses.insert(all.uses.end(), result.uses.begin(), result.uses.end());
+  }
+  return all;
 }
 
 PhotonResult ParticleTracer::tracePhotons(int pass, int count) const {
-  if (scene_.lights.empty()) return {};
-  const auto results = traceChunks<PhotonResult>(seed_, 2 * static_cast<std::uint64_t>(pass) + 1, count,
-                                                 [&](Rng& rng, PhotonResult& result) {
-                                                   if (const std::optional<EmittedPhoton> photon = emit(rng))
-                                                     PhotonWalk(scene_, importance_, rng, result).run(*photon);
-                                                 });
-  return {joined(results, &PhotonResult::particles), joined(results, &PhotonResult::requests)};
+  PhotonResult all;
+  if (scene_.lights.empty()) return all;
+  auto results = traceChunks<PhotonResult>(
+      seed_, 2 * static_cast<std::uint64_t>(pass) + 1, count, [&](int i, Rng& rng, PhotonResult& result) {
+        if (const std::optional<EmittedPhoton> photon = emit(rng))
+          PhotonWalk(scene_, importance_, rng, result).run(*photon, kFirstPhoton + static_cast<std::uint64_t>(i));
+      });
+  for (PhotonResult& result : results) {
+    all.radiance.merge(std::move(result.radiance));
+    all.importance.merge(std::move(result.importance));
+  }
+  return all;
 }
 
 std::optional<EmittedPhoton> ParticleTracer::emit(Rng& rng) const {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "runtime/render/public_types.h"
+
 namespace lobe {
 namespace {
 
@@ -26,7 +28,9 @@ float directShare(const EmittedPhoton& photon, const SurfaceHit& hit) {
 
 }  // namespace
 
-void PhotonWalk::run(const EmittedPhoton& photon) {
+void PhotonWalk::run(const EmittedPhoton& photon, std::uint64_t index) {
+  result_.radiance.beginPath(index);
+  result_.importance.beginPath(index);
   power_ = luminance(photon.power);
   if (!usable(power_)) return;
   waiting_.push_back({{photon.ray, photon.power}, 1});
@@ -45,7 +49,8 @@ void PhotonWalk::advance(const EmittedPhoton& photon, Branch branch) {
   std::optional<GuidedSampler::Vertex> vertex;
   if (hit->bsdf->deltaProbability(hit->wo, hit->uv) < 1) {
     vertex.emplace(importance_, *hit);
-    if (!vertex->hasRecord()) result_.requests.push_back({hit->position, normalTowards(*hit)});
+    if (!vertex->distribution().hasRecord())
+      result_.importance.requestRecord(asFloats(hit->position), asFloats(normalTowards(*hit)));
     store(photon, branch, *hit);
   }
   if (branch.depth == kMaxTrainingDepth) return;
@@ -64,8 +69,8 @@ void PhotonWalk::store(const EmittedPhoton& photon, const Branch& branch, const 
   const float flux = luminance(branch.flight.weight);
   const float weight = flux * (first ? directShare(photon, hit) : 1.0f);
   if (usable(weight))
-    result_.particles.push_back(
-        {hit.position, normalTowards(hit), hit.woWorld, weight, first && photon.far ? kInfinity : hit.distance, flux});
+    result_.radiance.addPhoton(asFloats(hit.position), asFloats(normalTowards(hit)), asFloats(hit.woWorld), weight,
+                               first && photon.far ? kInfinity : hit.distance, flux);
 }
 
 // How many branches go on: none, by chance, of a photon that carries next to nothing, several of one that carries too

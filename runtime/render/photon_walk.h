@@ -1,17 +1,18 @@
 #pragma once
 // One photon in training: light carried from an emitter to all surfaces that it meets.
 
+#include <cstdint>
 #include <vector>
 
-#include "runtime/guiding/particle.h"
+#include "lobe/sample_storage.h"
 #include "runtime/render/environment_guide.h"
 #include "runtime/render/particle_flight.h"
 
 namespace lobe {
 
 struct PhotonResult {
-  std::vector<Particle> particles;      ///< every arrival at a surface that is not only delta
-  std::vector<RecordRequest> requests;  ///< where guiding by importance found no record
+  SampleStorage radiance;    ///< every arrival at a surface that is not only delta
+  SampleStorage importance;  ///< requests for records where guiding by importance found none
 };
 
 class PhotonWalk {
@@ -20,7 +21,8 @@ class PhotonWalk {
   PhotonWalk(const RenderScene& scene, const GuidedSampler& importance, Rng& rng, PhotonResult& result)
       : scene_(scene), importance_(importance), rng_(rng), result_(result) {}
 
-  void run(const EmittedPhoton& photon);
+  /// index: of the path, told to the storages.
+  void run(const EmittedPhoton& photon, std::uint64_t index);
 
  private:
   struct Branch {

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "runtime/guiding/field_data.h"
+#include "runtime/guiding/sample_storage_data.h"
 #include "runtime/plots/disc_panel.h"
 #include "runtime/plots/text.h"
 #include "runtime/render/guided_integrator.h"
@@ -42,17 +44,18 @@ class Histogram {
 
 /// What the record's neighbourhood held, in the frame that it learnt in.
 Neighbourhood neighbourhoodOf(const IlluminationRecord& record, const RenderScene& scene,
-                              const TrainedIllumination& illumination, const TrainingOptions& options) {
-  const std::array<std::span<const Particle>, 2> sources{illumination.particles[0], illumination.particles[1]};
+                              const TrainedIllumination& illumination, const FieldOptions& options) {
+  const SampleStorageData& particles = dataOf(illumination.particles);
+  const std::array<std::span<const Particle>, 2> sources{particles.photons, particles.samples};
   const float reach = options.unitShare * scene.tracer.bounds().diagonal().norm();
   const ParticleNeighbours neighbours(sources, options.neighbours, reach);
   if (neighbours.empty()) return {};
   return neighbours.around(record.position, record.normal, record.tangent);
 }
 
-ReceivedLight lightAt(const RenderScene& scene, const IlluminationCache& cache, const Receiver& receiver,
+ReceivedLight lightAt(const RenderScene& scene, const Field& field, const Receiver& receiver,
                       const ServedDensity& density) {
-  const GuidedSampler sampler(scene.scene, cache, nullptr);
+  const GuidedSampler sampler(scene.scene, field, nullptr);
   const GuidedIntegrator paths(scene, {}, sampler);
   ReceivedLightOptions options;
   options.cells = kCells;
@@ -128,16 +131,16 @@ Receiver receiverAt(const RenderScene& scene, const RayCamera& camera, int x, in
 }
 
 RecordView viewRecord(const RenderScene& scene, const Receiver& receiver, const TrainedIllumination& illumination,
-                      const TrainingOptions& options) {
-  const ServedDensity density(illumination.cache, receiver);
+                      const FieldOptions& options) {
+  const ServedDensity density(cacheOf(illumination.field), receiver);
   if (!density.record())
     throw NoRecord(fmt::format("no record serves the point {} seen there", numbers(receiver.point.position)));
-  const IlluminationRecord record = illumination.cache.unpacked(*density.record());
+  const IlluminationRecord record = cacheOf(illumination.field).unpacked(*density.record());
 
   const Neighbourhood around = neighbourhoodOf(record, scene, illumination, options);
   Histogram particles, truth;
   for (const WeightedPoint& p : around.points) particles.add(p.y, p.weight);
-  const ReceivedLight light = lightAt(scene, illumination.cache, receiver, density);
+  const ReceivedLight light = lightAt(scene, illumination.field, receiver, density);
   for (const ReceivedLight::Sample& s : light.samples())
     truth.add(toDisc(density.frame().toLocal(s.wi)), 0.5 * (s.first + s.second) / s.density);
 

@@ -40,6 +40,6 @@ Receiver receiverAt(const RenderScene& scene, const RayCamera& camera, int x, in
 /// Of the record that serves a receiver. Without particles (trained elsewhere, or not kept) their panel stays empty.
 /// options: what was trained with. Throws NoRecord when none serves it.
 RecordView viewRecord(const RenderScene& scene, const Receiver& receiver, const TrainedIllumination& illumination,
-                      const TrainingOptions& options);
+                      const FieldOptions& options);
 
 }  // namespace lobe

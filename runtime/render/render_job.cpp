@@ -132,16 +132,16 @@ struct Guiding {
   Guiding(const Guiding&) = delete;
   Guiding& operator=(const Guiding&) = delete;
 
-  std::optional<BrdfCaches> caches;
+  std::optional<LobeCacheSet> caches;
   TrainedIllumination training;
   std::optional<GuidedSampler> sampler;
 
-  const BrdfCaches* cachesOrNull() const { return caches ? &*caches : nullptr; }
+  const LobeCacheSet* cachesOrNull() const { return caches ? &*caches : nullptr; }
   std::size_t unreducedBytes = 0;  ///< of the records
 
   void reduceRecords(float threshold) {
-    unreducedBytes = training.cache.bytes();
-    if (threshold > 0) training.cache = reduced(training.cache, threshold);
+    unreducedBytes = training.field.bytes();
+    if (threshold > 0) training.field = training.field.reduced(threshold);
   }
 };
 
@@ -203,11 +203,11 @@ nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, c
           {"peak_rss_bytes", peakResidentBytes()},
           {"training_passes", passes},
           {"training_particles", run.training().particles()},
-          {"records", run.guiding.training.cache.size()},
+          {"records", run.guiding.training.field.records()},
           {"records_undersampled_share", run.training().undersampledShare},
           {"record_bytes_before_reduction", run.guiding.unreducedBytes},
-          {"record_bytes", run.guiding.training.cache.bytes()},
-          {"record_components", run.guiding.training.cache.meanComponents()},
+          {"record_bytes", run.guiding.training.field.bytes()},
+          {"record_components", run.guiding.training.field.meanComponents()},
           {"lobe_components", run.guiding.caches ? run.guiding.caches->meanComponents() : 0.0},
           {"lobe_bytes", run.guiding.caches ? run.guiding.caches->bytes() : 0},
           {"strategy_shares", sharesOf(paths.strategies, kSamplingStrategyNames)},
@@ -364,7 +364,7 @@ void run(const RenderJob& job) {
       printNote(kTool,
                 fmt::format("{}: its records have learnt no shares of the BSDF (trained by guided, or with --shares "
                             "fixed): all have {:.1f}",
-                            job.illumination.string(), kProductShares.bsdf));
+                            job.illumination.string(), kInitialBsdfFraction));
     load.restoring = restoring.seconds();
   }
   if (job.integrator == IntegratorKind::product)
@@ -378,7 +378,7 @@ void run(const RenderJob& job) {
   if (job.integrator != IntegratorKind::path) {
     if (!stored) train(job, renderScene, camera, guiding);
     guiding.reduceRecords(job.reduction);
-    guiding.sampler.emplace(scene, guiding.training.cache, guiding.cachesOrNull());
+    guiding.sampler.emplace(scene, guiding.training.field, guiding.cachesOrNull());
   }
   if (receiver) drawRecord(job, renderScene, *receiver, guiding.training);
 

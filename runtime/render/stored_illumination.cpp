@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "runtime/guiding/field_data.h"
 #include "runtime/guiding/illumination_store.h"
 #include "scenes/scene_hash.h"
 #include "schema/atomic_file.h"
@@ -44,7 +45,7 @@ void saveIllumination(const std::filesystem::path& path, const TrainedIlluminati
   info.settings = settingsOf(plan, trained.report);
   info.particles = trained.report.particles();
   info.undersampledShare = trained.report.undersampledShare;
-  const std::vector<std::byte> bytes = storeIllumination(trained.cache, std::move(info));
+  const std::vector<std::byte> bytes = storeIllumination(cacheOf(trained.field), std::move(info));
   writeAtomically(path, std::span<const std::byte>(bytes));
 }
 
@@ -57,7 +58,7 @@ TrainedIllumination restoreIllumination(const IlluminationFile& file, const std:
         "{}: trained for another scene ({}, hash {:016x}; this one has {:016x}): train again, with --save-illumination",
         path.string(), info.scene, info.sceneHash, hash));
   TrainedIllumination trained;
-  trained.cache = loadIllumination(file);
+  trained.field = fieldOf(loadIllumination(file));
   trained.report.undersampledShare = info.undersampledShare;
   trained.report.learntShares = info.settings.learntShares;
   return trained;

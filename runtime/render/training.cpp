@@ -1,7 +1,6 @@
 #include "runtime/render/training.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -13,7 +12,7 @@ namespace lobe {
 namespace {
 
 /// Importance only steers photons: half the components and neighbours do (measured by lobebench-illumination).
-TrainingOptions importanceOptions(TrainingOptions options) {
+FieldOptions importanceOptions(FieldOptions options) {
   options.components = std::max(1, options.components / 2);
   options.neighbours = std::max(1, options.neighbours / 2);
   return options;
@@ -57,12 +56,12 @@ class PassSizes {
 /// importons have brought.
 class Training {
  public:
-  Training(const RenderScene& scene, const RayCamera& camera, const BrdfCaches* caches, const TrainingPlan& plan)
+  Training(const RenderScene& scene, const RayCamera& camera, const LobeCacheSet* caches, const TrainingPlan& plan)
       : plan_(plan),
-        radiance_(plan.records, scene.tracer.bounds().diagonal().norm()),
-        importance_(importanceOptions(plan.records), scene.tracer.bounds().diagonal().norm()),
-        radianceSampler_(scene.scene, radiance_.cache(), caches),
-        importanceSampler_(scene.scene, importance_.cache(), nullptr) {
+        radiance_(inScene(plan.records, scene)),
+        importance_(importanceOptions(inScene(plan.records, scene))),
+        radianceSampler_(scene.scene, radiance_, caches),
+        importanceSampler_(scene.scene, importance_, nullptr) {
     const bool tracesPhotons = plan.from != TrainFrom::paths;
     if (tracesPhotons && scene.lights.environmentProbability() > 0) guide_.emplace(scene.lights);
     wishes_ = {guide_.has_value(), tracesPhotons, plan.from != TrainFrom::photons,
@@ -81,40 +80,42 @@ class Training {
       for (const EnvironmentUse& use : importons.uses) guide_->learn(use.point, use.wi, use.weight);
       guide_->update();
     }
-    samples_ = std::move(importons.samples);
-    radiance_.learnShares(importons.shares);
     PhotonResult photons;
     if (wishes_.importance) photons = tracer_->tracePhotons(pass, shareOf(plan_.photons, size));
-    photons_ = std::move(photons.particles);
-    PassReport report{0, photons_.size() + samples_.size(), 0, std::nullopt};
+    samples_ = std::move(importons.radiance);
+    samples_.merge(std::move(photons.radiance));
+    importons.importance.merge(std::move(photons.importance));
+    PassReport report{0, samples_.particles(), 0, std::nullopt};
     // Side by side: what one has to do in order leaves room for the other.
-    oneapi::tbb::parallel_invoke(
-        [&] { importance_.learn(std::array{std::span<const Particle>(importons.importance)}, photons.requests); },
-        [&] { report.logLikelihood = radiance_.learn(sources(), importons.requests); });
-    report.records = radiance_.cache().size();
+    oneapi::tbb::parallel_invoke([&] { importance_.update(importons.importance); },
+                                 [&] { report.logLikelihood = radiance_.update(samples_); });
+    report.records = radiance_.records();
     report.seconds = watch.seconds();
     return report;
   }
 
   /// Radii have shrunk since the last requests were made: a last look closes the gaps.
   void finish(int passes, double size) {
-    radiance_.fill(sources(), tracer_->traceImportons(passes, shareOf(plan_.importons, size), {}).requests);
+    radiance_.fill(tracer_->traceImportons(passes, shareOf(plan_.importons, size), {}).radiance, samples_);
   }
 
-  const IlluminationTrainer& radiance() const { return radiance_; }
-  std::array<std::vector<Particle>, 2> takeParticles() { return {std::move(photons_), std::move(samples_)}; }
+  const Field& radiance() const { return radiance_; }
+  SampleStorage takeParticles() { return std::move(samples_); }
 
  private:
   static int shareOf(int count, double size) { return std::max(1, static_cast<int>(std::lround(size * count))); }
-  std::array<std::span<const Particle>, 2> sources() const { return {photons_, samples_}; }
+  static FieldOptions inScene(FieldOptions options, const RenderScene& scene) {
+    options.sceneDiagonal = scene.tracer.bounds().diagonal().norm();
+    return options;
+  }
 
   const TrainingPlan& plan_;
-  IlluminationTrainer radiance_, importance_;
+  Field radiance_, importance_;
   GuidedSampler radianceSampler_, importanceSampler_;
   std::optional<EnvironmentGuide> guide_;
   ImportonWishes wishes_;
   std::optional<ParticleTracer> tracer_;
-  std::vector<Particle> photons_, samples_;  // of the last pass
+  SampleStorage samples_;  // of the last pass
 };
 
 }  // namespace
@@ -140,7 +141,7 @@ std::uint64_t TrainingReport::particles() const {
   return sum;
 }
 
-TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera& camera, const BrdfCaches* caches,
+TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera& camera, const LobeCacheSet* caches,
                                       const TrainingPlan& plan,
                                       const std::function<void(const PassReport&)>& afterPass) {
   plan.validate();
@@ -160,7 +161,7 @@ TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera&
   report.seconds = watch.seconds();
   report.undersampledShare = training.radiance().undersampledShare();
   report.learntShares = plan.learnShares && caches != nullptr;
-  TrainedIllumination trained{training.radiance().cache(), report, {}};
+  TrainedIllumination trained{training.radiance().frozen(), report, {}};
   if (plan.keepParticles) trained.particles = training.takeParticles();
   return trained;
 }

@@ -1,13 +1,12 @@
 #pragma once
 // Trains the illumination of a scene, pass by pass.
 
-#include <array>
 #include <functional>
 #include <map>
 #include <string>
 #include <vector>
 
-#include "runtime/guiding/illumination_trainer.h"
+#include "lobe/field.h"
 #include "runtime/render/particle_tracer.h"
 
 namespace lobe {
@@ -27,7 +26,7 @@ struct TrainingPlan {
   std::uint64_t seed = 1;
   bool learnShares = true;  ///< of the BSDF, by record, else kProductShares; without caches there is nothing to learn
   bool keepParticles = false;  ///< of the last pass, for TrainedIllumination::particles
-  TrainingOptions records;
+  FieldOptions records;        ///< but for the scene's diagonal, which training sets
 
   /// Throws std::runtime_error that names the field.
   void validate() const;
@@ -51,15 +50,14 @@ struct TrainingReport {
 };
 
 struct TrainedIllumination {
-  IlluminationCache cache;
+  Field field;
   TrainingReport report;
-  /// Where kept: photons, and samples of camera paths. Their weights are of different scales.
-  std::array<std::vector<Particle>, 2> particles;
+  SampleStorage particles;  ///< of the last pass, where kept
 };
 
 /// caches: for the product; nullptr: paths in training are guided by illumination only. afterPass: called with what
 /// each pass did.
-TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera& camera, const BrdfCaches* caches,
+TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera& camera, const LobeCacheSet* caches,
                                       const TrainingPlan& plan,
                                       const std::function<void(const PassReport&)>& afterPass = {});
 

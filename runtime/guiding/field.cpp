@@ -1,0 +1,126 @@
+#include "lobe/field.h"
+
+#include <array>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "runtime/guiding/field_data.h"
+#include "runtime/guiding/illumination_store.h"
+#include "runtime/guiding/sample_storage_data.h"
+#include "schema/atomic_file.h"
+
+namespace lobe {
+namespace {
+
+TrainingOptions trainingOptions(const FieldOptions& options) {
+  TrainingOptions training;
+  training.components = options.components;
+  training.neighbours = options.neighbours;
+  training.unitShare = options.unitShare;
+  training.klThreshold = options.klThreshold;
+  return training;
+}
+
+IlluminationTrainer& trainerOf(FieldData& data) {
+  if (!data.trainer) throw std::logic_error("a field that was loaded from a file cannot be trained further");
+  return *data.trainer;
+}
+
+/// Calls use with the content in the order of its paths.
+template <class Use>
+auto inOrder(const SampleStorageData& data, const Use& use) {
+  return data.isInOrder() ? use(data) : use(data.inOrder());
+}
+
+}  // namespace
+
+void FieldOptions::validate() const {
+  static_assert(kMostComponents == kMaxLightComponents);
+  if (!(sceneDiagonal > 0)) throw std::runtime_error(fmt::format("sceneDiagonal: over 0, not {}", sceneDiagonal));
+  trainingOptions(*this).validate();
+}
+
+Field::Field() : data_(std::make_shared<FieldData>()) {}
+
+Field::Field(const FieldOptions& options) : data_(std::make_shared<FieldData>()) {
+  options.validate();
+  data_->trainer.emplace(trainingOptions(options), options.sceneDiagonal);
+}
+
+Field::Field(std::shared_ptr<FieldData> data) : data_(std::move(data)) {}
+Field::~Field() = default;
+Field::Field(const Field&) = default;
+Field& Field::operator=(const Field&) = default;
+
+Field Field::load(const std::filesystem::path& path) {
+  auto data = std::make_shared<FieldData>();
+  data->frozen = loadIllumination(IlluminationFile::open(path));
+  return Field(std::move(data));
+}
+
+void Field::save(const std::filesystem::path& path) const {
+  IlluminationInfo info;
+  info.toolVersion = LOBE_VERSION;
+  const std::vector<std::byte> bytes = storeIllumination(cache(), std::move(info));
+  writeAtomically(path, std::span<const std::byte>(bytes));
+}
+
+std::optional<double> Field::update(const SampleStorage& storage) {
+  IlluminationTrainer& trainer = trainerOf(*data_);
+  return inOrder(*storage.data_, [&](const SampleStorageData& data) {
+    trainer.learnShares(data.fractions);
+    return trainer.learn(std::array{std::span<const Particle>(data.photons), std::span<const Particle>(data.samples)},
+                         data.requests);
+  });
+}
+
+void Field::fill(const SampleStorage& requests, const SampleStorage& particles) {
+  IlluminationTrainer& trainer = trainerOf(*data_);
+  inOrder(*requests.data_, [&](const SampleStorageData& asked) {
+    inOrder(*particles.data_, [&](const SampleStorageData& data) {
+      trainer.fill(std::array{std::span<const Particle>(data.photons), std::span<const Particle>(data.samples)},
+                   asked.requests);
+    });
+  });
+}
+
+Field Field::frozen() const {
+  return fieldOf(cache());
+}
+
+const IlluminationCache& Field::cache() const {
+  return data_->cache();
+}
+
+Field Field::reduced(float cost) const {
+  return fieldOf(lobe::reduced(cache(), cost));
+}
+
+double Field::meanComponents() const {
+  return cache().meanComponents();
+}
+
+double Field::undersampledShare() const {
+  return data_->trainer ? data_->trainer->undersampledShare() : 0.0;
+}
+
+const IlluminationCache& cacheOf(const Field& field) {
+  return field.cache();
+}
+
+Field fieldOf(IlluminationCache cache) {
+  auto data = std::make_shared<FieldData>();
+  data->frozen = std::move(cache);
+  return Field(std::move(data));
+}
+
+std::size_t Field::records() const {
+  return cache().size();
+}
+
+std::size_t Field::bytes() const {
+  return cache().bytes();
+}
+
+}  // namespace lobe

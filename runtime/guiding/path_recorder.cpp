@@ -1,0 +1,81 @@
+#include "lobe/path_recorder.h"
+
+#include <cmath>
+#include <limits>
+
+#include "runtime/guiding/conversions.h"
+#include "runtime/guiding/sample_storage_data.h"
+#include "runtime/guiding/surface_distribution_impl.h"
+
+namespace lobe {
+namespace {
+
+using Rgb = Eigen::Array3f;
+
+/// Rec. 709.
+float luminance(const Rgb& c) {
+  return 0.212671f * c.x() + 0.715160f * c.y() + 0.072169f * c.z();
+}
+
+bool usable(float weight) {
+  return weight > 0 && std::isfinite(weight);
+}
+
+}  // namespace
+
+void PathRecorder::begin(std::uint64_t pathIndex) {
+  storage_->beginPath(pathIndex);
+  count_ = 0;
+}
+
+void PathRecorder::addVertex(const RecordedVertex& recorded, const SurfaceDistribution* distribution) {
+  if (count_ == kMaxVertices) return;
+  const Vec3 direction = toEigen(recorded.direction);
+  const Vec3 front = toEigen(recorded.normal);
+  const Vec3 normal = std::copysign(1.0f, front.dot(direction)) * front;
+  Vertex& last = vertices_[static_cast<std::size_t>(count_++)];
+  last = {recorded.position,
+          toFloats(normal),
+          recorded.direction,
+          normal.dot(direction) / recorded.pdf,
+          std::numeric_limits<float>::infinity(),
+          recorded.throughput,
+          0,
+          std::nullopt};
+  if (!options_.fractions || !distribution || !distribution->learnsFraction()) return;
+  const ShareSample share = distribution->impl().shareSample(toEigen(recorded.wi), recorded.bsdfPdf);
+  const Rgb weight = toEigen(recorded.weight).array();
+  last.fraction = {share.record, share.bsdf, share.mixtures, share.covered, luminance(weight)};
+}
+
+void PathRecorder::setDistance(float distance) {
+  if (count_ > 0) vertices_[static_cast<std::size_t>(count_ - 1)].distance = distance;
+}
+
+// Light that reached the camera also passed every vertex before: there it is the radiance that arrived from the next.
+void PathRecorder::addLight(const Float3& contribution) {
+  const Rgb light = toEigen(contribution).array();
+  for (int i = 0; i < count_; ++i) {
+    Vertex& vertex = vertices_[static_cast<std::size_t>(i)];
+    const Rgb carried = toEigen(vertex.throughput).array();
+    vertex.radiance += luminance((carried > 0).select(light / carried, Rgb::Zero()));
+  }
+}
+
+void PathRecorder::end() {
+  SampleStorageData& data = *storage_->data_;
+  for (int i = 0; i < count_; ++i) {
+    const Vertex& v = vertices_[static_cast<std::size_t>(i)];
+    const float weight = v.cosineOverPdf * v.radiance;
+    if (options_.particles && usable(weight))
+      data.samples.push_back({toEigen(v.position), toEigen(v.normal), toEigen(v.direction), weight, v.distance});
+    if (!v.fraction) continue;
+    const float fractionWeight = v.fraction->weight * v.radiance;
+    if (usable(fractionWeight))
+      data.fractions.push_back(
+          {v.fraction->record, v.fraction->bsdfPdf, v.fraction->mixturePdf, v.fraction->covered, fractionWeight});
+  }
+  count_ = 0;
+}
+
+}  // namespace lobe

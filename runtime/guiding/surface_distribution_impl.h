@@ -1,0 +1,37 @@
+#pragma once
+// The content of a SurfaceDistribution.
+
+#include <optional>
+
+#include "lobe/surface_distribution.h"
+#include "runtime/guiding/guided_density.h"
+#include "runtime/guiding/illumination_cache.h"
+#include "runtime/guiding/reflectance.h"
+#include "runtime/guiding/selection_share.h"
+
+namespace lobe {
+
+struct SurfaceDistribution::Impl {
+  const IlluminationCache* cache;
+  const PackedRecord* record;  // nullptr: none serves the point, and density is empty
+  Vec3 wo;
+  Eigen::Matrix3f axes;  // from the shading frame to the frame of the guiding mixtures
+  float side = 1;        // 1 where wo is in front, −1 on the back
+  float covered = 0;     // fraction of samples that mixtures may draw
+  GuidingDecision decision = GuidingDecision::noRecord;
+  bool product = false;
+  bool described = false;  // the reflectance is all that is reflected
+  Reflectance reflectance;
+  std::optional<GuidedDensity> density;
+
+  void collectReflectance(const SurfaceReflectance& given, const BrdfCaches& caches);
+  GuidingDecision decide() const;
+  /// Whether directions at this point tell of the record's BSDF sampling fraction.
+  bool learnsFraction() const {
+    return decision == GuidingDecision::product || (product && decision == GuidingDecision::illumination);
+  }
+  /// What a direction tells of it, but for its weight. Only where learnsFraction().
+  ShareSample shareSample(const Vec3& wi, float bsdfPdf) const;
+};
+
+}  // namespace lobe
