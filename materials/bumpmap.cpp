@@ -23,10 +23,13 @@ class BumpMap final : public NormalMapping {
     // plane.
     const Vec3 du(dpdu.x(), dpdu.y(), derivative(uv, Vec2(kHalfStep, 0.0f)));
     const Vec3 dv(dpdv.x(), dpdv.y(), derivative(uv, Vec2(0.0f, kHalfStep)));
-    const Vec3 cross = du.cross(dv);
-    const float length = cross.norm();
-    if (!(length > 0.0f) || cross.z() == 0.0f) return std::nullopt;
-    return Tilted{cross / (cross.z() > 0.0f ? length : -length), du, dv};  // mirrored coordinates turn it over
+    // In double precision: the lengths are those of any scene, to the fourth power.
+    const Eigen::Vector3d cross = du.cast<double>().cross(dv.cast<double>());
+    const double length = cross.norm();
+    if (!(length > 0.0) || cross.z() == 0.0) return std::nullopt;
+    const Vec3 normal =
+        (cross / (cross.z() > 0.0 ? length : -length)).cast<float>();  // mirrored coordinates turn it over
+    return Tilted{normal, du, dv};
   }
 
   /// By central differences of the displacement's luminance, over the step as it came out in floating point.

@@ -34,6 +34,10 @@ class Parameters {
  public:
   /// location: where the parameter stands in its file (an offset), handed back by unused() and location().
   void set(const std::string& name, ParameterValue value, std::ptrdiff_t location = 0);
+  /// That something given could not be read: what is missing then is no fault of its own.
+  void markIncomplete() { incomplete_ = true; }
+  bool isIncomplete() const { return incomplete_; }
+
   /// As if it had never been given.
   void erase(const std::string& name) { entries_.erase(name); }
   /// The value of a parameter that the file does not give. It is as if it were there, but nobody has to ask for it.
@@ -101,6 +105,7 @@ class Parameters {
   mutable std::vector<std::string> notes_;
   mutable std::vector<Warning> warnings_;
   std::vector<BsdfPtr> children_;
+  bool incomplete_ = false;
 };
 
 }  // namespace lobe

@@ -22,12 +22,13 @@ std::size_t total(const std::vector<Fault>& faults) {
                          [](std::size_t sum, const Fault& fault) { return sum + fault.count; });
 }
 
-/// Whether lenient reading gets past any of them.
-bool anyTolerable(const std::vector<Fault>& faults) {
-  return std::ranges::any_of(faults, [](const Fault& fault) { return !fault.consequence.empty(); });
+/// Whether lenient reading gets past all of them.
+bool areTolerable(const std::vector<Fault>& faults) {
+  return std::ranges::none_of(faults, [](const Fault& fault) { return fault.consequence.empty(); });
 }
 
 std::string describe(const std::vector<Fault>& faults) {
+  if (faults.empty()) return "it depends on what is at fault";
   if (faults.size() == 1) return faults.front().text();
   const std::size_t shown = std::min(kMostLines, faults.size());
   std::string lines;
@@ -35,7 +36,7 @@ std::string describe(const std::vector<Fault>& faults) {
   const std::string rest =
       shown < faults.size() ? fmt::format("; --check shows the other {}", faults.size() - shown) : "";
   return lines + fmt::format("{} faults of {} kinds{}{}", total(faults), faults.size(), rest,
-                             anyTolerable(faults) ? "; --lenient reads what can be read" : "");
+                             areTolerable(faults) ? "; --lenient reads what can be read" : "");
 }
 
 }  // namespace
@@ -53,6 +54,8 @@ SceneError::SceneError(std::vector<Fault> all) : std::runtime_error(describe(all
 void Findings::fault(std::string where, const std::string& kind, std::string message, std::string consequence) {
   const auto [entry, isNew] = faultOfKind_.try_emplace(kind, faults_.size());
   if (isNew && faults_.size() >= kMostKinds) throw SceneError(faults_);
+  // Definitions are read again after each included file.
+  if (!places_.insert(fmt::format("{} {}", where, kind)).second) return;
   if (isNew)
     faults_.push_back({std::move(where), std::move(message), std::move(consequence)});
   else

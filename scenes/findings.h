@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <map>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -25,7 +26,7 @@ struct Fault {
 class SceneError : public std::runtime_error {
  public:
   SceneError(std::string where, std::string message);
-  /// At least one fault.
+  /// None: what cannot be read depends on something that is a fault already.
   explicit SceneError(std::vector<Fault> all);
 
   const std::vector<Fault>& faults() const { return faults_; }
@@ -59,6 +60,7 @@ class Findings {
     std::vector<std::string> parameters;
   };
   std::map<std::string, std::size_t> faultOfKind_, warningOfKind_;  // indices
+  std::set<std::string> places_;                                    // of faults, with their kinds
   std::vector<Fault> faults_;
   std::vector<Warning> warnings_;
   std::vector<std::string> notes_;

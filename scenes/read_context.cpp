@@ -43,6 +43,10 @@ std::string describe(pugi::xml_node node) {
   return type ? fmt::format("{} \"{}\"", elementName(node), type.value()) : std::string(elementName(node));
 }
 
+std::string nameOf(pugi::xml_node node) {
+  return node.type() == pugi::node_element ? fmt::format("this <{}>", node.name()) : "this text";
+}
+
 std::string_view elementName(pugi::xml_node node) {
   constexpr std::array<std::string_view, 6> kColours = {"rgb", "srgb", "color", "xyz", "spectrum", "blackbody"};
   const std::string_view name = node.name();

@@ -59,6 +59,9 @@ std::string typeOf(const ReadContext& context, pugi::xml_node node);
 /// "bsdf \"plastic\"", or "scene" for an element without type.
 std::string describe(pugi::xml_node node);
 
+/// "this <bsdf>", or "this text".
+std::string nameOf(pugi::xml_node node);
+
 /// Name of the element, in today's spelling: camera is sensor, luminaire emitter (Mitsuba 0.4), lookAt lookat; a colour
 /// with a type and no value, such as <spectrum type="d65">, is a texture, as Mitsuba goes by the type alone.
 std::string_view elementName(pugi::xml_node node);

@@ -33,7 +33,7 @@ class SceneReader {
 
   void read() {
     for (const pugi::xml_node node : context_.file.scene().children())
-      context_.attempt(fmt::format("{} is left out", describe(node)), [&] { readElement(node); });
+      context_.attempt(fmt::format("{} is left out", nameOf(node)), [&] { readElement(node); });
     if (!sensor_ && context_.options.geometry)
       context_.unsupported(context_.file.scene(), "no sensor", "the scene has no <sensor>", "");
     emitters_.finish();
@@ -57,7 +57,7 @@ class SceneReader {
     else if (tag == "sensor")
       readFirstSensor(node);
     else if (tag == "integrator")
-      readIntegrator(context_, node);
+      readFirstIntegrator(node);
     else if (std::ranges::find(kElsewhere, tag) == kElsewhere.end())
       reject(node);
   }
@@ -71,6 +71,12 @@ class SceneReader {
     if (context_.scene.scale != 1.0f)
       context_.note(
           fmt::format("all lengths are multiplied by {:g}: the scene is far from ordinary size", context_.scene.scale));
+  }
+
+  void readFirstIntegrator(pugi::xml_node node) {
+    if (integrator_) return context_.note("only the first of several integrators is used");
+    integrator_ = true;
+    readIntegrator(context_, node);
   }
 
   void readFirstSensor(pugi::xml_node node) {
@@ -92,23 +98,29 @@ class SceneReader {
   MaterialReader materials_;
   ShapeReader shapes_;
   EmitterReader emitters_;
-  bool sensor_ = false;
+  bool sensor_ = false, integrator_ = false;
 };
+
+/// Without shapes and environment, what is at fault was all there is.
+void checkSomethingIsLeft(const std::filesystem::path& path, const Scene& scene, const ReadOptions& options,
+                          Findings& findings) {
+  if (options.lenient && options.geometry && !findings.faults().empty() && scene.shapes.empty() && !scene.environment)
+    findings.fault(path.string(), "nothing left", "without what is at fault nothing is left to draw", "");
+}
 
 Scene read(const std::filesystem::path& path, const ReadOptions& options, Findings& findings) {
   const SceneFile file(path, options.definitions, findings);
   Scene scene;
   ReadContext context(file, options, scene, findings);
   SceneReader(context).read();
+  checkSomethingIsLeft(path, scene, options, findings);
   return scene;
 }
 
 /// Whether what was read of a scene with these faults may not be used.
-bool mustRefuse(const std::vector<Fault>& faults, const Scene& scene, const ReadOptions& options) {
+bool mustRefuse(const std::vector<Fault>& faults, const ReadOptions& options) {
   if (faults.empty()) return false;
-  const bool nothingLeft = options.geometry && scene.shapes.empty() && !scene.environment;
-  return !options.lenient || nothingLeft ||
-         std::ranges::any_of(faults, [](const Fault& fault) { return fault.consequence.empty(); });
+  return !options.lenient || std::ranges::any_of(faults, [](const Fault& fault) { return fault.consequence.empty(); });
 }
 
 std::string asWarning(const Fault& fault) {
@@ -121,7 +133,7 @@ std::string asWarning(const Fault& fault) {
 Scene readScene(const std::filesystem::path& path, const ReadOptions& options) {
   Findings findings;
   Scene scene = read(path, options, findings);
-  if (mustRefuse(findings.faults(), scene, options)) throw SceneError(findings.faults());
+  if (mustRefuse(findings.faults(), options)) throw SceneError(findings.faults());
   scene.warnings = findings.warnings();
   for (const Fault& fault : findings.faults()) scene.warnings.push_back(asWarning(fault));
   scene.notes = findings.notes();
@@ -132,9 +144,9 @@ SceneCheck checkScene(const std::filesystem::path& path, const ReadOptions& opti
   Findings findings;
   SceneCheck check;
   try {
-    const Scene scene = read(path, options, findings);
+    read(path, options, findings);
     check.faults = findings.faults();
-    check.readable = !mustRefuse(check.faults, scene, options);
+    check.readable = !mustRefuse(check.faults, options);
   } catch (const SceneError& error) {
     check.faults = findings.faults();
     check.faults.insert(check.faults.end(), error.faults().begin(), error.faults().end());

@@ -22,15 +22,17 @@ constexpr std::string_view kValueElements =
 
 /// Parameters of Mitsuba's that do not change what a picture converges to: how things are stored and found, and what
 /// belongs to other integrators, to files that we do not write, or to motion, which we do not read. An element without
-/// a type stands for all its types; * stands for all names.
+/// a type stands for all its types.
 constexpr std::pair<std::string_view, std::string_view> kWithoutEffect[] = {
     {"texture \"bitmap\"", "accel, cache, format, max_anisotropy"},
     {"emitter \"constant\"", "to_world"},
     {"emitter \"envmap\"", "cache, mis_compensation"},
     {"film",
-     "attach_log, banner, burn, channel_names, component_format, compression, digits, exposure, file_format, filename, "
-     "gamma, has_alpha, high_quality_edges, key, pixel_format, sample_border, tonemap_method, variable"},
-    {"integrator", "*"},
+     "attach_log, banner, channel_names, component_format, compression, digits, file_format, filename, has_alpha, "
+     "high_quality_edges, sample_border, variable"},
+    {"integrator",
+     "aovs, block_size, bsdf_samples, emitter_samples, rr_depth, samples_per_pass, shading_samples, "
+     "strict_normals, timeout"},
     {"sensor", "shutter_close, shutter_open"},
     {"shape \"ply\"", "srgb"},
 };
@@ -39,8 +41,7 @@ bool hasNoEffect(const std::string& owner, std::string_view name) {
   const std::string_view tag = std::string_view(owner).substr(0, owner.find(' '));
   for (const auto& [element, names] : kWithoutEffect)
     if (element == owner || element == tag)
-      if (names == "*" || fmt::format(", {}, ", names).find(fmt::format(", {}, ", name)) != std::string::npos)
-        return true;
+      if (fmt::format(", {}, ", names).find(fmt::format(", {}, ", name)) != std::string::npos) return true;
   return false;
 }
 
@@ -96,12 +97,19 @@ Parameters readParameters(ReadContext& context, pugi::xml_node node, const std::
         fmt::format("<{}> is left out", target.name()));
   };
   for (const pugi::xml_node child : node.children())
-    context.attempt(fmt::format("this <{}> is ignored", child.name()), [&] { read(child); });
+    if (!context.attempt(fmt::format("{} is ignored", nameOf(child)), [&] { read(child); }))
+      parameters.markIncomplete();
   return parameters;
 }
 
 Parameters readParameters(ReadContext& context, pugi::xml_node node) {
   return readParameters(context, node, "", [](pugi::xml_node, const std::string&, Parameters&) { return false; });
+}
+
+void failUnlessIncomplete(const ReadContext& context, pugi::xml_node node, const Parameters& parameters,
+                          std::string_view message) {
+  if (parameters.isIncomplete()) throw SceneError(std::vector<Fault>());
+  context.file.fail(node, message);
 }
 
 void RefusedParameters::erase(ReadContext& context, pugi::xml_node node, Parameters& parameters,
@@ -112,7 +120,7 @@ void RefusedParameters::erase(ReadContext& context, pugi::xml_node node, Paramet
     parameters.erase(error.name);
     return;
   }
-  if (all_.empty()) context.file.fail(node, message);
+  if (all_.empty()) failUnlessIncomplete(context, node, parameters, message);
   const Refused last = std::move(all_.back());
   all_.pop_back();
   report(context);

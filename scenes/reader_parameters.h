@@ -34,6 +34,10 @@ void checkUnused(ReadContext& context, pugi::xml_node node, const Parameters& pa
 /// Passes on what the makers of the element noted and warned of.
 void passOnRemarks(ReadContext& context, pugi::xml_node node, const Parameters& parameters);
 
+/// Throws SceneError: with this fault, or with none when something in the element could not be read already.
+[[noreturn]] void failUnlessIncomplete(const ReadContext& context, pugi::xml_node node, const Parameters& parameters,
+                                       std::string_view message);
+
 /// Parameters that a model refuses, one after the other.
 class RefusedParameters {
  public:

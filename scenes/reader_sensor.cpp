@@ -86,13 +86,27 @@ FilmSize readSize(const Parameters& parameters, const Camera& camera) {
   return size;
 }
 
+/// What a film makes of the radiance that it has recorded is not applied: EXR files hold it as it is, PNG files in
+/// sRGB.
+void noteDevelopment(ReadContext& context, pugi::xml_node node, Parameters& parameters) {
+  constexpr std::array<const char*, 6> kNames = {"burn", "exposure", "gamma", "key", "pixel_format", "tonemap_method"};
+  for (const char* name : kNames) {
+    if (!parameters.contains(name)) continue;
+    const bool isRgb = parameters.holdsText(name) && parameters.text(name, "").starts_with("rgb");
+    if (!isRgb)
+      context.note(fmt::format("{}: {} is not applied: pictures hold linear RGB radiance", describe(node), name));
+    parameters.erase(name);
+  }
+}
+
 void readFilm(ReadContext& context, pugi::xml_node node) {
   const auto onChild = [&](pugi::xml_node child, const std::string&, Parameters&) {
     if (elementName(child) != "rfilter") return false;
     readFilter(context, child);
     return true;
   };
-  const Parameters parameters = readParameters(context, node, "rfilter", onChild);
+  Parameters parameters = readParameters(context, node, "rfilter", onChild);
+  noteDevelopment(context, node, parameters);
   Camera& camera = context.scene.camera;
   const FilmSize size = makeFrom(context, node, parameters, [&](const Parameters& p) { return readSize(p, camera); });
   camera.width = size.width;
@@ -189,6 +203,9 @@ Camera readCamera(ReadContext& context, pugi::xml_node node, const Parameters& p
 /// Integrators that show something else than the light that arrives.
 constexpr std::array<std::string_view, 6> kNotOfLight = {"albedo", "ao", "depth", "field", "motion", "normal"};
 
+/// Those whose parameters are known.
+constexpr std::array<std::string_view, 5> kPathTracers = {"direct", "path", "volpath", "volpath_simple", "volpathmis"};
+
 /// How much light an integrator leaves out.
 struct LightTransport {
   std::optional<int> maxDepth;
@@ -210,7 +227,20 @@ LightTransport readTransport(const std::string& type, const Parameters& paramete
   constexpr int kDirect = 2;  // segments
   if (type == "direct") transport.maxDepth = std::min(transport.maxDepth.value_or(kDirect), kDirect);
   transport.hideEmitters = parameters.flag("hide_emitters", false);
+  if (parameters.has("strict_normals") && !parameters.flag("strict_normals", true))
+    parameters.warn("strict_normals",
+                    "strict normals are always on: directions on which the shading normal and the "
+                    "surface disagree carry no light");
   return transport;
+}
+
+/// Of those that others know, only what is known here; their other parameters are theirs alone.
+void keepTransport(ReadContext& context, pugi::xml_node node, Parameters& parameters) {
+  for (const std::string& name : parameters.unused()) {
+    if (name == "max_depth" || name == "hide_emitters" || name == "strict_normals") continue;
+    context.findings.noteWithoutEffect(describe(node), name);
+    parameters.erase(name);
+  }
 }
 
 /// Of the integrator or, for one that wraps another, of the inner one.
@@ -225,7 +255,8 @@ LightTransport readTransportOf(ReadContext& context, pugi::xml_node node) {
     context.unsupported(node, "integrator " + type,
                         fmt::format("integrator \"{}\" shows something else than light", type),
                         "the light is rendered");
-  const Parameters parameters = readParameters(context, node, "integrator", onChild);
+  Parameters parameters = readParameters(context, node, "integrator", onChild);
+  if (std::ranges::find(kPathTracers, type) == kPathTracers.end()) keepTransport(context, node, parameters);
   const LightTransport own =
       makeFrom(context, node, parameters, [&](const Parameters& p) { return readTransport(type, p); });
   return nested.value_or(own);
@@ -266,7 +297,9 @@ void readIntegrator(ReadContext& context, pugi::xml_node node) {
   if (transport.hideEmitters)
     scene.emitterVisibility = context.file.isOfToday() ? EmitterVisibility::hidden : EmitterVisibility::dark;
   std::string kept;
-  if (transport.maxDepth) kept += fmt::format("; paths have at most {} segments, as there", *transport.maxDepth);
+  if (transport.maxDepth)
+    kept += fmt::format("; paths have at most {} segments, as there, unless the command line says otherwise",
+                        *transport.maxDepth);
   if (transport.hideEmitters) kept += "; emitters are hidden, as there";
   context.note(fmt::format("integrator \"{}\" is replaced by ours{}", node.attribute("type").value(), kept));
 }

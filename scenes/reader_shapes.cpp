@@ -157,7 +157,7 @@ void ShapeReader::addInstance(pugi::xml_node node) {
     return true;
   };
   const Parameters parameters = readParameters(context_, node, "ref", onChild);
-  if (!group) context_.file.fail(node, "an instance needs a <ref> to a shapegroup");
+  if (!group) failUnlessIncomplete(context_, node, parameters, "an instance needs a <ref> to a shapegroup");
   const std::string id = node.attribute("id").value();
   Shape shape = makeFrom(context_, node, parameters, [&](const Parameters& p) {
     return Shape{id.empty() ? "instance" : id, makeInstance(*group, p), -1, std::nullopt};
@@ -268,9 +268,13 @@ void ShapeReader::readMeshes() {
     if (context_.options.onProgress) context_.options.onProgress(1.0 / static_cast<double>(meshes_.size()));
   });
   for (const Mesh& mesh : meshes_) reportFault(mesh);
-  checkInstances();
+  clearInstancesOutOfRange();
   // From the back, as places are indices.
   for (auto mesh = meshes_.rbegin(); mesh != meshes_.rend(); ++mesh) dropEmpty(*mesh);
+  std::erase_if(context_.scene.shapes, [](const Shape& shape) {
+    const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry);
+    return mesh && mesh->triangles.empty();
+  });
 }
 
 void ShapeReader::read(Mesh& mesh) {
@@ -289,7 +293,8 @@ void ShapeReader::reportFault(const Mesh& mesh) {
   context_.unsupported(mesh.location, message, message, "the shape is left out");
 }
 
-void ShapeReader::checkInstances() {
+/// Leaves nothing of them but their places, which are indices that others know; readMeshes drops these at its end.
+void ShapeReader::clearInstancesOutOfRange() {
   for (const auto& [index, location] : instances_) {
     const auto& instance = std::get<Instance>(context_.scene.shapes[index].geometry);
     const ShapeGroup& group = context_.scene.groups[static_cast<std::size_t>(instance.group)];
@@ -298,7 +303,8 @@ void ShapeReader::checkInstances() {
     context_.unsupported(
         location, fmt::format("instance at {}", location),
         fmt::format("shape \"instance\": coordinates over {:g} in the world are not supported", kLargestCoordinate),
-        "");
+        "the instance is left out");
+    context_.scene.shapes[index].geometry = TriangleMesh();
   }
 }
 

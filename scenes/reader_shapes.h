@@ -57,7 +57,7 @@ class ShapeReader {
   void read(Mesh& mesh);
   void reportFault(const Mesh& mesh);
   /// A fault where one shows its group too far away.
-  void checkInstances();
+  void clearInstancesOutOfRange();
   void dropEmpty(const Mesh& mesh);
 
   ReadContext& context_;

@@ -82,7 +82,11 @@ std::optional<SpectrumPoints> parseSpectrumFile(std::string_view text) {
 
 Rgb rgbOfSpectrum(const SpectrumPoints& points, Illuminant illuminant) {
   const auto value = [&](double nm) { return valueAt(points, nm); };
-  return illuminant == Illuminant::d65 ? rgbOfReflectance(value) : rgbOfEmission(value);
+  if (illuminant == Illuminant::equalEnergy) return rgbOfEmission(value);
+  const Rgb colour = rgbOfReflectance(value);
+  // A saturated spectrum that reflects nowhere more than it receives may have components over 1.
+  const bool reflectsAtMostAll = std::ranges::all_of(points, [](const auto& point) { return point.second <= 1.0; });
+  return reflectsAtMostAll ? colour.min(1.0f).eval() : colour;
 }
 
 Rgb rgbOfBlackbody(double kelvin) {

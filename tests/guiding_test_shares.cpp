@@ -15,7 +15,7 @@ namespace {
 
 /// The line in place of directions: the BSDF's density is 1, the mixtures' 2x, on [0,1].
 ShareSample at(float x, float covered) {
-  return {nullptr, 1.0f, 2 * x, covered};
+  return {0, 1.0f, 2 * x, covered};
 }
 
 /// Samples of a target that is a + (1−a) 2x, drawn evenly.
@@ -67,9 +67,9 @@ TEST_CASE("guiding: samples that say nothing change no share") {
     samples.push_back(at(0.1f, 1));
     samples.back().weight = weight;
   }
-  samples.push_back({nullptr, infinity, 1, 1, 1});
-  samples.push_back({nullptr, 1, nan, 1, 1});
-  samples.push_back({nullptr, 0, 0, 1, 1});
+  samples.push_back({0, infinity, 1, 1, 1});
+  samples.push_back({0, 1, nan, 1, 1});
+  samples.push_back({0, 0, 0, 1, 1});
   CHECK(learnt(samples, 2).bsdf() == before);
 }
 
@@ -88,7 +88,7 @@ TEST_CASE("guiding: each record learns its own share, and keeps it") {
   REQUIRE((recordAt(0) && recordAt(1) && recordAt(0) != recordAt(1)));
   CHECK(recordAt(1)->bsdfShare == kProductShares.bsdf);
   std::vector<ShareSample> samples = samplesOf(0.9f, 1, 5000);
-  for (ShareSample& s : samples) s.record = recordAt(1);
+  for (ShareSample& s : samples) s.record = trainer.cache().indexOf(*recordAt(1));
   trainer.learnShares(samples);
   learn();
   CHECK(recordAt(0)->bsdfShare == kProductShares.bsdf);

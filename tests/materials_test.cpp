@@ -245,6 +245,15 @@ TEST_CASE("materials: bump normals are those of the displaced surface") {
       CHECK(n.z() > 0.0f);
     }
   }
+  // At any size of the surface, with bumps of that size.
+  for (const double size : {1e-12, 1e10}) {
+    const BsdfPtr sized =
+        bsdfOf("bumpmap", {{"", std::make_shared<Waves>()}, {"scale", 2.0 * size}}, {bsdfOf("diffuse")});
+    const Vec3 u = dpdu * static_cast<float>(size), v = Vec3(-0.1f, 1.5f, 0.0f) * static_cast<float>(size);
+    const Vec3 expected = bump->perturbedNormal(Vec3::UnitZ(), kUv, dpdu, Vec3(-0.1f, 1.5f, 0.0f));
+    CHECK((sized->perturbedNormal(Vec3::UnitZ(), kUv, u, v) - expected).norm() < 1e-4f);
+    CHECK((expected - Vec3::UnitZ()).norm() > 0.05f);
+  }
   const BsdfPtr flat = bsdfOf("bumpmap", {{"map", constantTexture(grey(0.4f))}}, {bsdfOf("diffuse")});
   CHECK(flat->perturbedNormal(Vec3::UnitZ(), kUv, dpdu, Vec3::UnitY()).isApprox(Vec3::UnitZ()));
   CHECK(flat->perturbedNormal(Vec3::UnitZ(), kUv, Vec3::Zero(), Vec3::Zero()) == Vec3::UnitZ());

@@ -218,11 +218,11 @@ TEST_CASE("render: what emitter sampling does alone is not learnt") {
     scene.lights.push_back(DirectionalLight{{0, -1, 0}, grey(1)});
   }
   const RenderScene ready(scene);
-  const IlluminationCache nothing;
+  const Field nothing;
   const GuidedSampler sampler(scene, nothing, nullptr);
   const RayCamera camera({}, {});
   const auto particles = [&](const RenderScene& s) {
-    return ParticleTracer(s, camera, sampler, sampler, nullptr, 1).tracePhotons(0, 2000).particles.size();
+    return ParticleTracer(s, camera, sampler, sampler, nullptr, 1).tracePhotons(0, 2000).radiance.particles();
   };
   CHECK(particles(ready) == 0);
   addShape(scene, Sphere{{0, 5, 0}, 4}, 0);  // what comes from the floor by way of a sphere is

@@ -9,6 +9,7 @@
 #include <oneapi/tbb/global_control.h>
 
 #include "render_test_tools.h"
+#include "runtime/guiding/field_data.h"
 #include "runtime/render/renderer.h"
 #include "runtime/render/training.h"
 #include "tests/agreement.h"
@@ -67,7 +68,7 @@ struct Trial {
   Trial(const Trial&) = delete;
   Trial& operator=(const Trial&) = delete;
 
-  const IlluminationCache& cache() const { return trained.cache; }
+  const IlluminationCache& cache() const { return cacheOf(trained.field); }
   Film render(const Integrator& integrator, int samples, std::uint64_t seed) const {
     Film film(camera.width(), camera.height());
     lobe::render(camera, integrator, film, {seed, samples, std::nullopt});
@@ -75,7 +76,7 @@ struct Trial {
   }
   Film path(int samples) const { return render(PathIntegrator(ready, {}), samples, 1); }
   Film guided(int samples) const {
-    const GuidedSampler sampler(scene, cache(), nullptr);
+    const GuidedSampler sampler(scene, trained.field, nullptr);
     return render(GuidedIntegrator(ready, {}, sampler), samples, 2);
   }
 
@@ -307,10 +308,11 @@ TEST_CASE("stability: training gives the same bytes on any number of threads") {
   const Scene scene = roomScene();
   const auto train = [&](TrainFrom from, std::size_t threads) {
     const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism, threads);
-    return trainIllumination(RenderScene(scene), RayCamera(scene.camera, scene.filter), nullptr, smallPlan(from)).cache;
+    return trainIllumination(RenderScene(scene), RayCamera(scene.camera, scene.filter), nullptr, smallPlan(from)).field;
   };
   for (const TrainFrom from : kSources) {
-    const IlluminationCache one = train(from, 1), two = train(from, 2);
+    const Field first = train(from, 1), second = train(from, 2);
+    const IlluminationCache &one = cacheOf(first), &two = cacheOf(second);
     REQUIRE(one.records().size() > 100);
     REQUIRE(one.records().size() == two.records().size());
     int different = 0;

@@ -6,6 +6,7 @@
 
 #include "materials/registry.h"
 #include "render_test_tools.h"
+#include "runtime/guiding/sample_storage_data.h"
 #include "runtime/render/training.h"
 
 using namespace lobe;
@@ -28,9 +29,9 @@ std::vector<Moments> photonFlux(const RenderScene& scene, const GuidedSampler& i
     const Vec2 u1 = rng.uniform2();
     PhotonResult result;
     if (const auto photon = scene.lights.samplePhoton(choice, u1, rng.uniform2()))
-      PhotonWalk(scene, importance, rng, result).run(*photon);
+      PhotonWalk(scene, importance, rng, result).run(*photon, static_cast<std::uint64_t>(i));
     std::vector<double> flux(bins);
-    for (const Particle& p : result.particles)
+    for (const Particle& p : dataOf(result.radiance).photons)
       if (const int bin = binOf(p); bin >= 0) flux[bin] += p.weight;
     for (int bin = 0; bin < bins; ++bin) moments[bin].add(flux[bin]);
   }
@@ -67,12 +68,13 @@ std::vector<Moments> pathFlux(const RenderScene& scene, const GuidedSampler& sam
     Rng rng(seed, 0, i);
     const Vec2 u = patch.half * (2 * rng.uniform2() - Vec2::Ones());
     ImportonResult result;
-    ImportonWalk(scene, sampler, wishes, rng, result).run({Vec3(u.x(), 0.01f, u.y()), -Vec3::UnitY()});
+    ImportonWalk(scene, sampler, wishes, rng, result).run({Vec3(u.x(), 0.01f, u.y()), -Vec3::UnitY()}, 0);
+    const std::vector<Particle>& samples = dataOf(result.radiance).samples;
     // Paths may come by again: only what the first vertex received is spread evenly over the patch.
-    const bool found = !result.samples.empty() && (result.samples[0].position - Vec3(u.x(), 0, u.y())).norm() < 1e-4f;
-    const int bin = found ? patch.bin(result.samples[0]) : -1;
+    const bool found = !samples.empty() && (samples[0].position - Vec3(u.x(), 0, u.y())).norm() < 1e-4f;
+    const int bin = found ? patch.bin(samples[0]) : -1;
     for (int b = 0; b < static_cast<int>(moments.size()); ++b)
-      moments[b].add(b == bin ? patch.area() * result.samples[0].weight : 0);
+      moments[b].add(b == bin ? patch.area() * samples[0].weight : 0);
   }
   return moments;
 }
@@ -110,20 +112,26 @@ Scene roomScene() {
 
 struct Guides {
   Guides(const RenderScene& scene, const RayCamera& camera)
-      : radiance(TrainingOptions(), scene.tracer.bounds().diagonal().norm()),
-        importance(TrainingOptions(), scene.tracer.bounds().diagonal().norm()),
-        radianceSampler(scene.scene, radiance.cache(), nullptr),
-        importanceSampler(scene.scene, importance.cache(), nullptr) {
+      : radiance(optionsFor(scene)),
+        importance(optionsFor(scene)),
+        radianceSampler(scene.scene, radiance, nullptr),
+        importanceSampler(scene.scene, importance, nullptr) {
     const ParticleTracer tracer(scene, camera, radianceSampler, importanceSampler, nullptr, 1);
     for (int pass = 0; pass < 3; ++pass) {
-      const ImportonResult importons = tracer.traceImportons(pass, 8000, {false, true, false});
-      const PhotonResult photons = tracer.tracePhotons(pass, 10000);
-      const std::vector<RecordRequest> everywhere = photons.requests;
-      importance.learn(std::array{std::span<const Particle>(importons.importance)}, everywhere);
-      radiance.learn(std::array{std::span<const Particle>(photons.particles)}, importons.requests);
+      ImportonResult importons = tracer.traceImportons(pass, 8000, {false, true, false});
+      PhotonResult photons = tracer.tracePhotons(pass, 10000);
+      importons.importance.merge(std::move(photons.importance));
+      importance.update(importons.importance);
+      importons.radiance.merge(std::move(photons.radiance));
+      radiance.update(importons.radiance);
     }
   }
-  IlluminationTrainer radiance, importance;
+  static FieldOptions optionsFor(const RenderScene& scene) {
+    FieldOptions options;
+    options.sceneDiagonal = scene.tracer.bounds().diagonal().norm();
+    return options;
+  }
+  Field radiance, importance;
   GuidedSampler radianceSampler, importanceSampler;
 };
 
@@ -138,7 +146,7 @@ RayCamera roomCamera() {
 
 struct Unguided {
   explicit Unguided(const Scene& scene) : sampler(scene, nothing, nullptr) {}
-  IlluminationCache nothing;
+  Field nothing;
   GuidedSampler sampler;
 };
 
@@ -149,7 +157,7 @@ TEST_CASE("training: guided photons bring the same light as others, with less no
   addShape(scene, Sphere{{0.9f, 0.6f, 0.4f}, 0.5f}, addMaterial(scene, std::make_shared<HalfMirror>(0.4f, 0.5f, 0.5f)));
   const RenderScene ready(scene);
   const Guides guides(ready, roomCamera());
-  REQUIRE(guides.importance.cache().records().size() > 30);
+  REQUIRE(guides.importance.records() > 30);
   const Unguided unguided(scene);
   const Patch patch{0.3f};
   const auto bin = [&](const Particle& p) { return patch.bin(p); };
@@ -182,7 +190,7 @@ TEST_CASE("training: camera paths and photons see the same light from the same d
   const RenderScene ready(scene);
   const Unguided unguided(scene);
   const Guides guides(ready, roomCamera());
-  REQUIRE(guides.radiance.cache().records().size() > 30);
+  REQUIRE(guides.radiance.records() > 30);
   const Patch patch;
   const auto photons = photonFlux(ready, unguided.sampler, 100000, 1, Patch::kRings * Patch::kSectors,
                                   [&](const Particle& p) { return patch.bin(p); });
@@ -207,10 +215,10 @@ TEST_CASE("training: in an integrating sphere all estimators have the closed for
   for (int i = 0; i < 50000; ++i) {
     Rng rng(2, 0, i);
     ImportonResult result;
-    ImportonWalk(ready, unguided.sampler, {false, false, true}, rng, result).run({Vec3::Zero(), Vec3::UnitX()});
+    ImportonWalk(ready, unguided.sampler, {false, false, true}, rng, result).run({Vec3::Zero(), Vec3::UnitX()}, 0);
     double sum = 0;
-    for (const Particle& p : result.samples) sum += p.weight;
-    excess.add(sum - irradiance * static_cast<double>(result.requests.size()));
+    for (const Particle& p : dataOf(result.radiance).samples) sum += p.weight;
+    excess.add(sum - irradiance * static_cast<double>(dataOf(result.radiance).requests.size()));
   }
   CHECK(std::abs(excess.mean()) < kMaxDeviation * excess.error());
 }

@@ -372,7 +372,8 @@ TEST_CASE("scenes: thin lenses, orthographic cameras, crops, shifts and filters"
   const FilmCrop picture = cropped.camera.picture();
   CHECK(std::array{picture.x, picture.y, picture.width, picture.height} == std::array{10, 0, 20, 50});
   CHECK(cropped.notes ==
-        std::vector<std::string>{"without effect on the picture: exposure, gamma of film \"ldrfilm\""});
+        std::vector<std::string>{"film \"ldrfilm\": exposure is not applied: pictures hold linear RGB radiance",
+                                 "film \"ldrfilm\": gamma is not applied: pictures hold linear RGB radiance"});
   CHECK(cropped.filter.kind == PixelFilter::Kind::mitchell);
   CHECK(cropped.filter.b == 0.2f);
   CHECK(cropped.filter.c == Approx(1.0 / 3));

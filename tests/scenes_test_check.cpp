@@ -271,4 +271,51 @@ TEST_CASE("scenes: clip planes are read and have to leave something between them
                     Catch::Contains("far_clip"));
 }
 
+TEST_CASE("scenes: what fails because of a fault is no fault of its own") {
+  const auto faults = [](const std::string& body) { return check(sceneOf(body + "<shape type=\"cube\"/>")).faults; };
+  CHECK(faults("<shape type=\"instance\"><ref id=\"nobody\"/></shape>").size() == 1);
+  CHECK(faults("<bsdf type=\"mask\"><ref id=\"nobody\"/></bsdf>").size() == 1);
+  CHECK(faults("<bsdf type=\"diffuse\"><float name=\"reflectance\" value=\"$undefined\"/></bsdf>").size() == 1);
+  CHECK(faults("<bsdf type=\"mask\"/>").size() == 1);
+}
+
+TEST_CASE("scenes: a fault is counted once however many files are included after it") {
+  const TestFolder folder;
+  folder.write("part.xml", "<scene version=\"3.0.0\"/>");
+  const std::string include = "<include filename=\"part.xml\"/>";
+  const SceneCheck found =
+      checkScene(folder.write("test.xml", sceneOf("<default name=\"a\"/>" + include + include + include)));
+  REQUIRE(found.faults.size() == 1);
+  CHECK(found.faults[0].count == 1);
+}
+
+TEST_CASE("scenes: slips in the integrators we know are faults; the first of several integrators counts") {
+  CHECK_THAT(faultOf("<integrator type=\"path\"><integer name=\"max_dpeth\" value=\"3\"/></integrator>"),
+             Catch::Contains("did you mean max_depth?") && Catch::Contains("--lenient"));
+  CHECK(faultOf("<integrator type=\"guided_path\"><integer name=\"budget\" value=\"3\"/></integrator>").empty());
+  const Scene scene = readBody(
+      "<integrator type=\"path\"><integer name=\"max_depth\" value=\"3\"/></integrator><integrator type=\"path\"/>");
+  CHECK(scene.maxDepth == 3);
+  const Scene loose =
+      readBody("<integrator type=\"path\"><boolean name=\"strict_normals\" value=\"false\"/></integrator>");
+  REQUIRE(loose.warnings.size() == 1);
+  CHECK_THAT(loose.warnings[0], Catch::Contains("strict normals are always on"));
+}
+
+TEST_CASE("scenes: a saturated spectrum that reflects at most all light has no component over 1") {
+  const auto colour = [](const std::string& points) {
+    return albedoOf(readBody("<shape type=\"sphere\"><bsdf type=\"diffuse\"><spectrum name=\"reflectance\" value=\"" +
+                             points + "\"/></bsdf></shape>"),
+                    0);
+  };
+  const Rgb red = colour("360:0, 549:0, 550:1, 830:1");
+  CHECK(red.x() == 1.0f);
+  CHECK(red.y() == Approx(0.368).epsilon(0.02));
+  CHECK(colour("360:2, 830:2").x() == Approx(2.0f).epsilon(1e-3));
+}
+
+TEST_CASE("scenes: lenient reading says when nothing is left") {
+  CHECK_THAT(faultOf("<shape type=\"torus\"/>", lenient()), Catch::Contains("nothing is left to draw"));
+}
+
 }  // namespace lobe

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "fitter/compile.h"
+#include "runtime/guiding/field_data.h"
 #include "runtime/render/path_integrator.h"
 #include "runtime/render/renderer.h"
 #include "runtime/render/training.h"
@@ -36,7 +37,7 @@ class Studio {
     plan.photons = 20000;
     plan.importons = 8000;
     plan.seed = 5;
-    illumination_ = trainIllumination(*renderScene_, *camera_, &*caches_, plan).cache;
+    illumination_ = trainIllumination(*renderScene_, *camera_, &*caches_, plan).field;
     guided_.emplace(scene_, illumination_, nullptr);
     product_.emplace(scene_, illumination_, &*caches_);
   }
@@ -58,8 +59,7 @@ class Studio {
   const RenderScene& renderScene() const { return *renderScene_; }
   const Scene& scene() const { return scene_; }
   const GuidedSampler& productSampler() const { return *product_; }
-  const IlluminationCache& illumination() const { return illumination_; }
-  const BrdfCaches& caches() const { return *caches_; }
+  const IlluminationCache& illumination() const { return cacheOf(illumination_); }
   std::filesystem::path lobes() const { return folder_ / "lobes"; }
 
  private:
@@ -67,8 +67,8 @@ class Studio {
   Scene scene_;
   std::optional<RenderScene> renderScene_;
   std::optional<RayCamera> camera_;
-  std::optional<BrdfCaches> caches_;
-  IlluminationCache illumination_;
+  std::optional<LobeCacheSet> caches_;
+  Field illumination_;
   std::optional<GuidedSampler> guided_, product_;
 };
 

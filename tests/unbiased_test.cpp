@@ -30,10 +30,10 @@ struct WrongSampler {
     Vertex(const WrongSampler& sampler, const SurfaceHit& hit) : vertex_(sampler.right, hit) {}
     std::optional<BsdfSample> sample(Rng& rng, PathStatistics& statistics) const {
       auto sample = vertex_.sample(rng, statistics);
-      if (sample && vertex_.hasRecord()) sample->pdf *= 1.1f;
+      if (sample && vertex_.distribution().hasRecord()) sample->pdf *= 1.1f;
       return sample;
     }
-    float pdf(const Vec3& wi) const { return vertex_.pdf(wi) * (vertex_.hasRecord() ? 1.1f : 1.0f); }
+    float pdf(const Vec3& wi) const { return vertex_.pdf(wi) * (vertex_.distribution().hasRecord() ? 1.1f : 1.0f); }
     std::optional<float> reflectedRadiance() const { return vertex_.reflectedRadiance(); }
 
    private:

@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "runtime/guiding/brdf_caches.h"
 #include "tests/mixtures_chi2.h"
 #include "tests/studio.h"
 
@@ -14,8 +15,13 @@ namespace {
 constexpr int kRecords = 20, kReflectances = 5;
 constexpr Chi2Options kFew{.samples = 20000, .bins = 64};
 
+BrdfCaches cachesOf(const Studio& studio) {
+  return {studio.lobes(), lobeRequests(studio.scene()), "lobefit"};
+}
+
 /// Reflectances of different lobes and directions, all with components, seen in the plane that a guide would turn.
 std::vector<Reflectance> someReflectances(const Studio& studio) {
+  const BrdfCaches caches = cachesOf(studio);
   const int lobes = static_cast<int>(lobeRequests(studio.scene()).size());
   std::vector<Reflectance> found;
   Rng rng(31);
@@ -28,7 +34,7 @@ std::vector<Reflectance> someReflectances(const Studio& studio) {
     reflectance.constant = found.size() % 2 == 0 ? 0.1f : 0.0f;
     reflectance.backgroundMass = reflectance.constant;
     const int lobe = static_cast<int>(found.size()) * lobes / kReflectances;
-    studio.caches().add(lobe, {r * azimuth.x(), r * azimuth.y(), z}, turn, 0.7f, reflectance);
+    caches.add(lobe, {r * azimuth.x(), r * azimuth.y(), z}, turn, 0.7f, reflectance);
     if (reflectance.gaussians.count() > 0) found.push_back(reflectance);
   }
   return found;
@@ -39,6 +45,7 @@ std::vector<Reflectance> someReflectances(const Studio& studio) {
 TEST_CASE("unbiased: lobes are looked up at the nearest elevation") {
   const Studio studio(readScene(std::filesystem::path(LOBE_SOURCE_DIR) / "scenes/jewelry.xml"), 60, 40);
   const std::vector<LobeRequest> requests = lobeRequests(studio.scene());
+  const BrdfCaches caches = cachesOf(studio);
   int elevations = 0, others = 0;
   for (std::size_t lobe = 0; lobe < requests.size(); ++lobe) {
     const LobeCache cache = LobeCache::open(studio.lobes() / lobeFileName(requests[lobe].model, requests[lobe].key));
@@ -48,7 +55,7 @@ TEST_CASE("unbiased: lobes are looked up at the nearest elevation") {
       const float theta = 1.57f * (static_cast<float>(i) + 0.5f) / 1000;
       const Vec3 wo(0, std::sin(theta), std::cos(theta));
       Reflectance reflectance;
-      studio.caches().add(static_cast<int>(lobe), wo, Vec2::UnitX(), 1, reflectance);
+      caches.add(static_cast<int>(lobe), wo, Vec2::UnitX(), 1, reflectance);
       const CacheRecord& expected = cache.records()[cache.lookup(static_cast<std::uint32_t>(grid.nearest(wo)))];
       others += reflectance.albedo + reflectance.uncoveredAlbedo != expected.albedo;
     }

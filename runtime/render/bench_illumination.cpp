@@ -13,6 +13,7 @@
 
 #include "runtime/core/parallel.h"
 #include "runtime/guiding/field_data.h"
+#include "runtime/guiding/sample_storage_data.h"
 #include "runtime/render/bench_training.h"
 #include "runtime/render/received_light.h"
 
@@ -62,7 +63,7 @@ std::vector<Particle> heldOutParticles(const RenderScene& scene, const RayCamera
       guide->learn(use.point, use.wi, use.weight);
     guide->update();
   }
-  return tracer.tracePhotons(0, o.heldOutPhotons).particles;
+  return dataOf(tracer.tracePhotons(0, o.heldOutPhotons).radiance).photons;
 }
 
 Exam makeExam(const RenderScene& scene, const RayCamera& camera, const Options& o, const Field& best) {

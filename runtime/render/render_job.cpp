@@ -85,6 +85,9 @@ Scene readFor(const RenderJob& job) {
       readScene(job.scene, {job.definitions, job.lenient, true, [&](double share) { progress.advance(share); }});
   for (const std::string& note : scene.notes) printNote(kTool, note);
   for (const std::string& warning : scene.warnings) printWarning(kTool, warning);
+  const bool shines = std::ranges::any_of(scene.shapes, [](const Shape& shape) { return shape.emitter.has_value(); });
+  if (!shines && !scene.environment && scene.lights.empty())
+    printWarning(kTool, fmt::format("{}: nothing emits light: the picture is black", job.scene.string()));
   if (job.size) {
     if (scene.camera.crop) printWarning(kTool, "--size is that of the whole film: the file's crop is dropped");
     scene.camera.crop.reset();
