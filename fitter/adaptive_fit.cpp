@@ -22,10 +22,10 @@ constexpr double kWorthwhile = 0.25;
 // Numbers of components that are tried after one.
 constexpr std::array<std::uint32_t, 5> kSizes{2, 3, 4, 6, 8};
 // Decisions need fewer points than the grades that are stored.
-constexpr std::uint32_t kDecisionShare = 4;
+constexpr std::uint32_t kDecisionFraction = 4;
 // A lobe of this standard deviation on the disc is over ten times narrower than what illumination starts to learn with.
-constexpr double kNarrow = 0.004;
-constexpr std::uint32_t kNarrowRecords = 8;
+constexpr double kTooNarrow = 0.004;
+constexpr std::uint32_t kTooNarrowRecords = 8;
 
 double secondMoment(const FittedRecord& fitted) {
   return 1.0 + fitted.worse();
@@ -40,7 +40,7 @@ double widthOf(const Lobe& lobe) {
   for (const LobeDraw& d : drawLobe(lobe, wo, 0, points)) {
     // Tails count little: a narrow peak with long tails is narrow.
     const Eigen::Vector2d y = (toDisc(d.wi) + toDisc(wo)).cast<double>();
-    const double w = d.value / d.pdf / (1 + y.squaredNorm() / (kNarrow * kNarrow));
+    const double w = d.value / d.pdf / (1 + y.squaredNorm() / (kTooNarrow * kTooNarrow));
     squares += w * y * y.transpose();
     weight += w;
   }
@@ -104,14 +104,14 @@ class DirectionFits {
 
   FittedRecord byWeightedEm(std::uint32_t components) const {
     FitSettings settings = settings_;
-    settings.method = kMethodWem;
+    settings.method = FitMethod::wem;
     settings.components = components;
     return fitter_.fit(settings);
   }
 
   FittedRecord refined(std::span<const Gaussian> start) const {
     FitSettings settings = settings_;
-    settings.method = kMethodCeres;
+    settings.method = FitMethod::ceres;
     return fitter_.fit(settings, start);
   }
 
@@ -173,7 +173,7 @@ class AdaptiveFitter {
   void leaveToBsdf(const std::function<void()>& advance) {
     const std::vector<int> entries = entriesOf(lobe_, grid_);
     for (std::size_t i = 0; i < entries.size(); ++i) {
-      if (i < kNarrowRecords) add(entries[i], withoutComponents(entries[i]), 0);
+      if (i < kTooNarrowRecords) add(entries[i], withoutComponents(entries[i]), 0);
       if (advance) advance();
     }
   }
@@ -209,7 +209,7 @@ class AdaptiveFitter {
     const FittedRecord& neighbour = records_[found];
     Mixture aligned(neighbour.mixture.size());
     alignMixture({grid_.kind, references_[found], {}}, neighbour.mixture, wo, aligned);
-    const Quality served = gradeMixture(lobe_, wo, aligned, settings_.samples / kDecisionShare);
+    const Quality served = gradeMixture(lobe_, wo, aligned, settings_.samples / kDecisionFraction);
     const double moment = 1 + served.worse();
     // A look-up may be worse than a fit for the direction itself by as much as a fit may be worse than the lobe.
     if (moment <= (1 + targets_[found]) * secondMoment(neighbour)) return std::nullopt;
@@ -257,7 +257,7 @@ int adaptiveDirections(const Lobe& lobe, const DirectionGrid& grid) {
 FittedGrid fitAdaptively(const Lobe& lobe, const DirectionGrid& grid, const FitSettings& settings,
                          const std::function<void()>& advance) {
   AdaptiveFitter fitter(lobe, grid, settings);
-  if (widthOf(lobe) < kNarrow)
+  if (widthOf(lobe) < kTooNarrow)
     fitter.leaveToBsdf(advance);
   else
     fitter.fit(advance);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <unordered_map>
 #include <utility>
 
 #include <fmt/format.h>
@@ -11,9 +10,9 @@
 #include "fitter/adaptive_fit.h"
 #include "fitter/cache_mixture.h"
 #include "fitter/lobe_fit.h"
+#include "runtime/core/atomic_file.h"
 #include "runtime/core/parallel.h"
 #include "runtime/mixture/lookup.h"
-#include "schema/atomic_file.h"
 
 namespace lobe {
 namespace {
@@ -26,10 +25,9 @@ void require(bool condition, const char* option, const std::string& range) {
 }
 
 DirectionGrid gridFor(const Lobe& lobe, const CompileOptions& options) {
-  const int directions = options.settings.method == kMethodAuto ? kAutoDirections : kDirections;
+  const int directions = options.settings.method == FitMethod::automatic ? kAutoDirections : kDirections;
   if (lobe.kind() == LobeKind::isotropic) return {GridKind::elevation, options.elevations.value_or(kElevations)};
-  if (lobe.kind() == LobeKind::anisotropic) return {GridKind::fibonacci, options.directions.value_or(directions)};
-  throw std::runtime_error(fmt::format("lobe {} is constant or a mirror: neither can be fitted", lobe.summary()));
+  return {GridKind::fibonacci, options.directions.value_or(directions)};
 }
 
 /// Everything the fit depends on, as it is kept in the file.
@@ -38,8 +36,8 @@ FitSettings settingsFor(const Lobe& lobe, const CompileOptions& options) {
   settings.revision = kFitRevision;
   const bool pinned =
       lobe.kind() == LobeKind::isotropic ? options.elevations.has_value() : options.directions.has_value();
-  settings.fixedGrid = pinned || settings.method != kMethodAuto;
-  if (settings.method == kMethodAuto)
+  settings.fixedGrid = pinned || settings.method != FitMethod::automatic;
+  if (settings.method == FitMethod::automatic)
     settings.reduction = 0;
   else
     settings.quality = 0;
@@ -103,7 +101,7 @@ int neighbourStride(const DirectionGrid& grid) {
 }
 
 std::vector<std::vector<int>> chainsOf(const DirectionGrid& grid, const FitSettings& settings) {
-  const int stride = neighbourStride(grid), length = settings.method == kMethodWem ? 1 : kChainLength;
+  const int stride = neighbourStride(grid), length = settings.method == FitMethod::wem ? 1 : kChainLength;
   std::vector<std::vector<int>> chains;
   for (int first = 0; first < grid.count; first += stride * length) {
     for (int i = first; i < std::min(first + stride, grid.count); ++i) {
@@ -117,9 +115,9 @@ std::vector<std::vector<int>> chainsOf(const DirectionGrid& grid, const FitSetti
 /// Least squares for the product may end in a worse place than weighted EM that has converged; then they start from
 /// there, and are no worse.
 FittedRecord notAboveWeightedEm(const DirectionFitter& fitter, const FitSettings& settings, FittedRecord found) {
-  if (settings.method != kMethodCeres) return found;
+  if (settings.method != FitMethod::ceres) return found;
   FitSettings wem = settings;
-  wem.method = kMethodWem;
+  wem.method = FitMethod::wem;
   const FittedRecord reached = fitter.fit(wem);
   return found.worse() <= reached.worse() ? found : fitter.fit(settings, reached.mixture);
 }
@@ -143,7 +141,7 @@ FittedRecord fitFromNeighbour(const DirectionFitter& fitter, const Vec3& wo, Gri
 FittedRecord fitOfChain(const Lobe& lobe, const Vec3& wo, GridKind kind, const std::optional<Neighbour>& neighbour,
                         const FitSettings& settings) {
   // Every record chooses its components for itself.
-  if (settings.method == kMethodAuto) return fitWithFewest(lobe, wo, settings);
+  if (settings.method == FitMethod::automatic) return fitWithFewest(lobe, wo, settings);
   const DirectionFitter fitter(lobe, wo, settings.samples);
   return notAboveWeightedEm(
       fitter, settings, neighbour ? fitFromNeighbour(fitter, wo, kind, *neighbour, settings) : fitter.fit(settings));
@@ -187,14 +185,13 @@ FittedGrid withoutFit(const DirectionGrid& grid) {
 
 FitSettings defaultFitSettings() {
   FitSettings settings;
-  settings.method = kMethodAuto;
+  settings.method = FitMethod::automatic;
   settings.quality = kDefaultQuality;
   return settings;
 }
 
 void CompileOptions::validate() const {
   require(!directory.empty(), "--output", "the name of a folder");
-  requireMethod(settings.method);
   require(settings.components >= 1 && settings.components <= kMaxCacheComponents, "--components",
           fmt::format("from 1 to {}", kMaxCacheComponents));
   require(settings.samples >= kMinSamples && settings.samples <= kMaxSamples, "--samples",
@@ -203,21 +200,6 @@ void CompileOptions::validate() const {
   require(settings.quality > 0 && std::isfinite(settings.quality), "--quality", "over 0");
   for (const auto& [count, option] : {std::pair{elevations, "--elevations"}, std::pair{directions, "--directions"}})
     require(!count || (*count >= 1 && *count <= kMaxRecords), option, fmt::format("from 1 to {}", kMaxRecords));
-}
-
-std::vector<LobeUse> collectLobes(const Scene& scene) {
-  std::vector<LobeUse> uses;
-  std::unordered_map<std::string, std::size_t> known;
-  for (const Material& material : scene.materials) {
-    for (const LobePtr& lobe : material.bsdf->lobes()) {
-      const auto [entry, isNew] = known.try_emplace(lobe->key(), uses.size());
-      if (isNew) uses.push_back({lobe, {}});
-      std::vector<std::string>& names = uses[entry->second].materials;
-      // Both sides of a two-sided material may have the same lobe.
-      if (names.empty() || names.back() != material.name) names.push_back(material.name);
-    }
-  }
-  return uses;
 }
 
 std::vector<CompileJob> planCompile(const std::vector<LobeUse>& uses, const CompileOptions& options) {

@@ -1,5 +1,5 @@
 #pragma once
-// The compile driver: from the lobes of a scene's materials to cache files that are up to date.
+// The compile driver: from lobes to cache files that are up to date.
 
 #include <filesystem>
 #include <functional>
@@ -10,7 +10,6 @@
 #include "fitter/fitted_grid.h"
 #include "materials/lobe.h"
 #include "runtime/mixture/grid.h"
-#include "scenes/scene.h"
 #include "schema/lobe_cache.h"
 
 namespace lobe {
@@ -32,15 +31,6 @@ struct CompileOptions {
   /// Throws std::runtime_error that names the option.
   void validate() const;
 };
-
-/// A lobe and all materials that have it.
-struct LobeUse {
-  LobePtr lobe;
-  std::vector<std::string> materials;
-};
-
-/// The lobes of a scene, equal ones (by key) once, in the order of the materials.
-std::vector<LobeUse> collectLobes(const Scene& scene);
 
 /// One cache file to be had.
 struct CompileJob {

@@ -74,16 +74,16 @@ using Columns = Eigen::Map<Eigen::MatrixXd>;
 void densityDerivatives(const WhitenedComponent& c, const ComponentAtPoints& at, const ArrayXd& mixtureDensity,
                         const ArrayXd& slope, Columns& to) {
   // By Σ: dN = ½ N tr((u uᵀ − Σ⁻¹) dΣ), so by L: N (u uᵀ − Σ⁻¹) L.
-  const ArrayXd share = c.weight * slope * at.density;
+  const ArrayXd fraction = c.weight * slope * at.density;
   const Matrix2d sl = at.inverse * c.lower;
   const double l11 = c.lower(0, 0), l21 = c.lower(1, 0), l22 = c.lower(1, 1);
-  const auto column = [&](Index i) { return to.col(i).head(share.size()).array(); };
-  column(0) = share - c.weight * slope * mixtureDensity;
-  column(1) = share * (at.u0 * c.meanSlope(0, 0) + at.u1 * c.meanSlope(1, 0));
-  column(2) = share * (at.u0 * c.meanSlope(0, 1) + at.u1 * c.meanSlope(1, 1));
-  column(3) = share * (at.u0 * (at.u0 * l11 + at.u1 * l21) - sl(0, 0)) * c.lowerSlope(0, 0);
-  column(4) = share * (at.u1 * (at.u0 * l11 + at.u1 * l21) - sl(1, 0)) * c.lowerSlope(1, 0);
-  column(5) = share * (at.u1 * at.u1 * l22 - sl(1, 1)) * c.lowerSlope(1, 1);
+  const auto column = [&](Index i) { return to.col(i).head(fraction.size()).array(); };
+  column(0) = fraction - c.weight * slope * mixtureDensity;
+  column(1) = fraction * (at.u0 * c.meanSlope(0, 0) + at.u1 * c.meanSlope(1, 0));
+  column(2) = fraction * (at.u0 * c.meanSlope(0, 1) + at.u1 * c.meanSlope(1, 1));
+  column(3) = fraction * (at.u0 * (at.u0 * l11 + at.u1 * l21) - sl(0, 0)) * c.lowerSlope(0, 0);
+  column(4) = fraction * (at.u1 * (at.u0 * l11 + at.u1 * l21) - sl(1, 0)) * c.lowerSlope(1, 0);
+  column(5) = fraction * (at.u1 * at.u1 * l22 - sl(1, 1)) * c.lowerSlope(1, 1);
 }
 
 using Slopes = Eigen::Matrix<double, 1, kComponentParameters>;
@@ -101,8 +101,8 @@ using Residuals = Eigen::Map<ArrayXd>;
 
 // sqrt(w) (f − p)/sqrt(p), whose change by p is −sqrt(w) (f + p)/(2 p^{3/2}); and the penalty.
 void productResiduals(const State& s, const FitPoints& points, Residuals residuals, double* jacobian) {
-  const double guided = (1 - kDefensiveShare) / s.cosine;
-  const ArrayXd p = kDefensiveShare * points.ownPdf + guided * points.cosine * s.density;
+  const double guided = (1 - kGradedBsdfFraction) / s.cosine;
+  const ArrayXd p = kGradedBsdfFraction * points.ownPdf + guided * points.cosine * s.density;
   const ArrayXd scale = (points.weight / p).sqrt();
   const Index count = points.size(), rows = count + 1;
   residuals.head(count) = scale * (points.target - p);

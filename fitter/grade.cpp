@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "fitter/disc_mass.h"
-#include "fitter/low_discrepancy.h"
+#include "runtime/core/low_discrepancy.h"
 
 namespace lobe {
 namespace {
@@ -16,7 +16,7 @@ class GradedDensity {
   double cosineMass() const { return cosineMass_; }
   double operator()(const Vec3& wi, double ownPdf) const {
     const double guided = 0.5 * mixturePdf(mixture_, toDisc(wi)) * wi.z() / cosineMass_;
-    return kDefensiveShare * ownPdf + (1 - kDefensiveShare) * guided;
+    return kGradedBsdfFraction * ownPdf + (1 - kGradedBsdfFraction) * guided;
   }
   double operator()(const Vec3& wi) const { return (*this)(wi, lobe_.pdf(wo_, wi)); }
 
@@ -62,7 +62,7 @@ Moments fromMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> 
 
 /// What points of q say of a mixture.
 struct FromOwn {
-  Moments drawn, covered;  // ∫ f and ∫ f²/p: drawn from q as a part of p; by importance sampling from q
+  Moments drawn, coverage;  // ∫ f and ∫ f²/p: drawn from q as a part of p; by importance sampling from q
   Worst worst;
 };
 
@@ -73,8 +73,8 @@ FromOwn fromOwn(const std::vector<LobeDraw>& draws, const GradedDensity& p, std:
     own.worst.visit(ratio, d.wi);
     own.drawn.first += ratio / samples;
     own.drawn.second += ratio * ratio / samples;
-    own.covered.first += f / d.pdf / samples;
-    own.covered.second += f * ratio / d.pdf / samples;
+    own.coverage.first += f / d.pdf / samples;
+    own.coverage.second += f * ratio / d.pdf / samples;
   }
   return own;
 }
@@ -88,16 +88,16 @@ Quality Grader::grade(std::span<const Gaussian> mixture) const {
   const GradedDensity p(lobe_, wo_, mixture);
   FromOwn own = fromOwn(draws_, p, samples_);
   const Moments guided = fromMixture(lobe_, wo_, mixture, p, samples_, own.worst);
-  constexpr double beta = kDefensiveShare;
+  constexpr double beta = kGradedBsdfFraction;
   const Moments drawn{beta * own.drawn.first + (1 - beta) * guided.first,
                       beta * own.drawn.second + (1 - beta) * guided.second};
   const Worst& worst = own.worst;
   const double worstRatio = drawn.first > 0 ? worst.ratio / drawn.first : 0;
-  return {drawn.relativeVariance(), own.covered.relativeVariance(), worstRatio, worst.wi};
+  return {drawn.relativeVariance(), own.coverage.relativeVariance(), worstRatio, worst.wi};
 }
 
 double Grader::coverage(std::span<const Gaussian> mixture) const {
-  return fromOwn(draws_, GradedDensity(lobe_, wo_, mixture), samples_).covered.relativeVariance();
+  return fromOwn(draws_, GradedDensity(lobe_, wo_, mixture), samples_).coverage.relativeVariance();
 }
 
 Quality gradeMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> mixture, std::uint32_t samples) {

@@ -11,7 +11,7 @@
 namespace lobe {
 
 /// The share of BSDF sampling in the density that a fit is graded with.
-inline constexpr double kDefensiveShare = 0.1;
+inline constexpr double kGradedBsdfFraction = 0.1;
 
 /// NEV of one sample for f = ρ cosθ against p = 0.1 q + 0.9 G cosθ / ∫ G cosθ dA, q the lobe's own density: the
 /// relative variance of f/p. Samples that the sampler rejects count, with f = 0. 0 where nothing is reflected.

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "fitter/low_discrepancy.h"
+#include "runtime/core/low_discrepancy.h"
 
 namespace lobe {
 

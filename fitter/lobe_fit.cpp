@@ -9,8 +9,8 @@
 
 #include "fitter/disc_mass.h"
 #include "fitter/lobe_draws.h"
-#include "fitter/low_discrepancy.h"
 #include "fitter/nonlinear_fit.h"
+#include "runtime/core/low_discrepancy.h"
 #include "runtime/mixture/em.h"
 
 namespace lobe {
@@ -25,7 +25,7 @@ constexpr double kVarianceFloor = 1e-4;
 constexpr double kSharpest = 1e-5;
 // Weighted EM that only starts least squares need not converge, nor see all points.
 constexpr int kStartSweeps = 15;
-constexpr std::size_t kStartShare = 4;
+constexpr std::size_t kStartFraction = 4;
 constexpr float kBroadVariance = 0.25f;
 
 std::vector<WeightedPoint> weightedPoints(const std::vector<LobeDraw>& draws) {
@@ -45,10 +45,10 @@ Spread spreadOf(const std::vector<WeightedPoint>& points) {
   for (const WeightedPoint& p : points) weight += p.weight, x += p.weight * p.y.x(), y += p.weight * p.y.y();
   Spread spread;
   for (const WeightedPoint& p : points) {
-    const double dx = p.y.x() - x / weight, dy = p.y.y() - y / weight, share = p.weight / weight;
-    spread.xx += share * dx * dx;
-    spread.xy += share * dx * dy;
-    spread.yy += share * dy * dy;
+    const double dx = p.y.x() - x / weight, dy = p.y.y() - y / weight, fraction = p.weight / weight;
+    spread.xx += fraction * dx * dx;
+    spread.xy += fraction * dx * dy;
+    spread.yy += fraction * dy * dy;
   }
   return spread;
 }
@@ -73,12 +73,6 @@ void normalise(Mixture& mixture) {
 
 }  // namespace
 
-void requireMethod(const std::string& method) {
-  if (method == kMethodAuto || method == kMethodWem || method == kMethodCeres || method == kMethodEq8) return;
-  throw std::runtime_error(fmt::format("--method must be {}, {}, {} or {}, not '{}'", kMethodAuto, kMethodWem,
-                                       kMethodCeres, kMethodEq8, method));
-}
-
 struct DirectionFitter::Graded {
   Mixture mixture;
   Quality quality;
@@ -97,9 +91,9 @@ Mixture DirectionFitter::expectationMaximised(const FitSettings& settings) const
   Mixture mixture = startMixture(points, spread, settings.components);
   WeightedEmOptions options;
   options.minVariance = kVarianceFloor * spread.smallerVariance();
-  if (settings.method != kMethodWem) {
+  if (settings.method != FitMethod::wem) {
     options.maxSweeps = kStartSweeps;
-    points.resize((points.size() + kStartShare - 1) / kStartShare);
+    points.resize((points.size() + kStartFraction - 1) / kStartFraction);
   }
   weightedEm(points, mixture, options);
   std::erase_if(mixture, [](const Gaussian& g) { return !(g.weight > 0); });
@@ -115,7 +109,7 @@ DirectionFitter::Graded DirectionFitter::graded(Mixture mixture) const {
 /// The start, refined when that makes it better.
 DirectionFitter::Graded DirectionFitter::refined(const Mixture& start, const FitSettings& settings) const {
   NonlinearFitOptions options;
-  if (settings.method == kMethodEq8) options.objective = FitObjective::reflectance;
+  if (settings.method == FitMethod::eq8) options.objective = FitObjective::reflectance;
   options.points = samples_ / 2;
   Mixture mixture = refineMixture(lobe_, wo_, start, options).mixture;
   normalise(mixture);
@@ -147,8 +141,7 @@ FittedRecord DirectionFitter::record(Graded best) const {
 }
 
 FittedRecord DirectionFitter::fit(const FitSettings& settings, std::span<const Gaussian> start) const {
-  requireMethod(settings.method);
-  const bool wem = settings.method == kMethodWem, chained = !start.empty() && !draws_.empty() && !wem;
+  const bool wem = settings.method == FitMethod::wem, chained = !start.empty() && !draws_.empty() && !wem;
   Mixture mixture = chained ? Mixture(start.begin(), start.end()) : expectationMaximised(settings);
   normalise(mixture);
   return record(wem ? graded(std::move(mixture)) : refined(mixture, settings));

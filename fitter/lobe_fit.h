@@ -16,15 +16,8 @@ namespace lobe {
 /// Raised when the code of the fit changes what it returns; caches of another revision are stale.
 inline constexpr std::uint32_t kFitRevision = 3;
 
-/// FitSettings::method: as ceres, but with as little as is good enough (see adaptive_fit.h); weighted EM; least squares
-/// for the use in a product, by Ceres; least squares by the objective of Herholz et al. 2016, Eq. 8.
-inline constexpr const char* kMethodAuto = "auto";
-inline constexpr const char* kMethodWem = "wem";
-inline constexpr const char* kMethodCeres = "ceres";
-inline constexpr const char* kMethodEq8 = "eq8";
-
-/// Throws std::runtime_error that says what there is instead.
-void requireMethod(const std::string& method);
+// FitMethod::automatic: as ceres, with as little as is good enough (adaptive_fit.h); wem: weighted EM; ceres: least
+// squares for the use in a product; eq8: least squares by the objective of Herholz et al. 2016, Eq. 8.
 
 struct FittedRecord {
   Mixture mixture;                                                          ///< weights sum to one

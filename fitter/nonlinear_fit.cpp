@@ -5,7 +5,7 @@
 #include <ceres/tiny_solver.h>
 
 #include "fitter/lobe_draws.h"
-#include "fitter/low_discrepancy.h"
+#include "runtime/core/low_discrepancy.h"
 
 namespace lobe {
 namespace {
@@ -19,9 +19,9 @@ struct Point {
   double weight;
 };
 
-constexpr double kStartShare = 0.5;
+constexpr double kStartFraction = 0.5;
 
-constexpr std::uint32_t kCoarseShare = 4;
+constexpr std::uint32_t kCoarseFraction = 4;
 constexpr double kCoarseTolerance = 10;
 
 std::vector<Point> ownPoints(const Lobe& lobe, const Vec3& wo, std::uint32_t count) {
@@ -97,7 +97,7 @@ FitPoints fitPoints(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> 
     const std::vector<Point> points = ownPoints(lobe, wo, options.points);
     return points.empty() ? FitPoints{} : asArrays(points, false);
   }
-  const auto guided = static_cast<std::uint32_t>(kStartShare * options.points), own = options.points - guided;
+  const auto guided = static_cast<std::uint32_t>(kStartFraction * options.points), own = options.points - guided;
   std::vector<Point> points = ownPoints(lobe, wo, own);
   if (points.empty()) return {};
   addStartPoints(lobe, wo, start, guided, points);
@@ -135,7 +135,7 @@ NonlinearFit refineMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gau
                            const NonlinearFitOptions& options) {
   // Most of the way is as well gone on few points.
   NonlinearFitOptions coarse = options;
-  coarse.points /= kCoarseShare;
+  coarse.points /= kCoarseFraction;
   coarse.tolerance *= kCoarseTolerance;
   const NonlinearFit first = solved(lobe, wo, start, coarse);
   NonlinearFit second = solved(lobe, wo, first.mixture, options);

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "materials/lobe.h"
-#include "materials/vec.h"
+#include "runtime/core/vec.h"
 
 namespace lobe {
 
@@ -51,7 +51,7 @@ struct LobeMixture {
   float constant = 0;  ///< albedo of the constant (diffuse) reflection, luminance
   /// Share in [0,1] of the smooth part's albedo that nothing above describes: what goes to the other side of the
   /// surface, and what is reflected by lobes that cannot be fitted.
-  float undescribedShare = 0;
+  float undescribedFraction = 0;
 };
 
 class Bsdf {

@@ -7,13 +7,14 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
-#include "materials/vec.h"
+#include "runtime/core/vec.h"
 
 namespace lobe {
 
-/// What a fit has to vary with. A constant lobe (ρ does not depend on wi) needs no fit, a delta lobe has none.
-enum class LobeKind { constant, isotropic, anisotropic, delta };
+/// Whether ρ changes when wo and wi are rotated together about the normal (anisotropic).
+enum class LobeKind { isotropic, anisotropic };
 
 struct LobeSample {
   Vec3 wi;
@@ -25,7 +26,6 @@ class Lobe {
  public:
   virtual ~Lobe() = default;
 
-  /// isotropic or anisotropic: only what can be fitted is a Lobe.
   virtual LobeKind kind() const = 0;
 
   /// Short name of the model for file names and tables, e.g. "ggx-conductor".
@@ -58,5 +58,11 @@ class Lobe {
 };
 
 using LobePtr = std::shared_ptr<const Lobe>;
+
+/// A lobe and the names of the materials that have it.
+struct LobeUse {
+  LobePtr lobe;
+  std::vector<std::string> materials;
+};
 
 }  // namespace lobe

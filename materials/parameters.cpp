@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "materials/fingerprint.h"
+#include "runtime/core/fingerprint.h"
 
 namespace lobe {
 namespace {

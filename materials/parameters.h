@@ -16,7 +16,7 @@
 
 #include "materials/bsdf.h"
 #include "materials/texture.h"
-#include "materials/vec.h"
+#include "runtime/core/vec.h"
 
 namespace lobe {
 

@@ -6,7 +6,7 @@
 #include <memory>
 #include <optional>
 
-#include "materials/vec.h"
+#include "runtime/core/vec.h"
 
 namespace lobe {
 

@@ -14,8 +14,8 @@
 #include <Eigen/Geometry>
 
 #include "materials/bsdf.h"
-#include "materials/image.h"
 #include "materials/texture.h"
+#include "runtime/image/image.h"
 
 namespace lobe {
 

@@ -1,6 +1,6 @@
 #include "scenes/scene_hash.h"
 
-#include "materials/fingerprint.h"
+#include "runtime/core/fingerprint.h"
 #include "runtime/core/parallel.h"
 
 namespace lobe {

@@ -40,7 +40,7 @@ void checkRecord(const StoredIllumination& r, std::size_t index, std::span<const
   require(r.background >= 0 && r.background <= 1, "share of the background out of range");
   require(r.irradiance >= 0, "a negative irradiance");
   require(r.samples >= 0, "a negative number of samples");
-  require(r.bsdfShare > 0 && r.bsdfShare < 1, "share of the BSDF out of range");
+  require(r.bsdfFraction > 0 && r.bsdfFraction < 1, "share of the BSDF out of range");
   require(r.count <= kMaxStoredComponents, "number of components out of range");
   require(componentsInRange(r.first, r.count, components), "components out of range");
   require(r.count == 0 || weightsSumToOne(components.subspan(r.first, r.count)), "the weights do not sum to one");
@@ -52,9 +52,9 @@ IlluminationInfo readInfo(const fb::Illumination& file) {
           .scene = file.scene()->str(),
           .sceneHash = file.scene_hash(),
           .settings = {s.from()->str(), s.passes(), s.photons(), s.importons(), s.components(), s.seed(),
-                       s.learnt_shares()},
+                       s.learnt_fractions()},
           .particles = file.particles(),
-          .undersampledShare = file.undersampled_share(),
+          .undersampledFraction = file.undersampled_fraction(),
           .unit = file.unit()};
 }
 
@@ -69,7 +69,7 @@ IlluminationFile::IlluminationFile(MappedFile file, const std::filesystem::path&
   records_ = inPlace<StoredIllumination>(*root.records());
   components_ = inPlace<CacheComponent>(*root.components());
   if (!(info_.unit > 0 && std::isfinite(info_.unit))) refuseDamaged(name, "the unit of length is not positive");
-  if (!(info_.undersampledShare >= 0 && info_.undersampledShare <= 1))
+  if (!(info_.undersampledFraction >= 0 && info_.undersampledFraction <= 1))
     refuseDamaged(name, "share of undersampled records out of range");
   checkComponents(components_, name);
   for (std::size_t i = 0; i < records_.size(); ++i) {
@@ -88,7 +88,7 @@ std::vector<std::byte> encodeIllumination(const IlluminationInfo& info, std::spa
   flatbuffers::FlatBufferBuilder builder(1024 + records.size_bytes() + components.size_bytes());
   const StoredTrainingSettings& s = info.settings;
   const auto settings = fb::CreateTrainingSettings(builder, builder.CreateString(s.from), s.passes, s.photons,
-                                                   s.importons, s.components, s.seed, s.learntShares);
+                                                   s.importons, s.components, s.seed, s.learntFractions);
   const auto toolVersion = builder.CreateString(info.toolVersion);
   const auto scene = builder.CreateString(info.scene);
   const auto recordVector =
@@ -96,7 +96,7 @@ std::vector<std::byte> encodeIllumination(const IlluminationInfo& info, std::spa
   const auto componentVector =
       builder.CreateVectorOfStructs(reinterpret_cast<const fb::Component*>(components.data()), components.size());
   builder.Finish(fb::CreateIllumination(builder, toolVersion, scene, info.sceneHash, settings, info.particles,
-                                        info.undersampledShare, info.unit, recordVector, componentVector));
+                                        info.undersampledFraction, info.unit, recordVector, componentVector));
   return wrapPayload(kIlluminationFormat, std::as_bytes(std::span(builder.GetBufferPointer(), builder.GetSize())));
 }
 

@@ -19,7 +19,7 @@ inline constexpr FileFormat kIlluminationFormat{{'I', 'L', 'L', 'U'}, 2, 1};
 /// goes here, into illumination.fbs, the checks of illumination_file.cpp and runtime/guiding/illumination_store.cpp.
 struct StoredIllumination {
   std::array<float, 3> position, normal, tangent;
-  float radius, background, irradiance, samples, bsdfShare;
+  float radius, background, irradiance, samples, bsdfFraction;
   std::uint32_t first, count;
 };
 
@@ -30,7 +30,7 @@ struct StoredTrainingSettings {
   std::string from = "both";
   std::uint32_t passes = 0, photons = 0, importons = 0, components = 0;
   std::uint64_t seed = 0;
-  bool learntShares = false;  ///< bsdfShare is each record's own
+  bool learntFractions = false;  ///< bsdfFraction is each record's own
   bool operator==(const StoredTrainingSettings&) const = default;
 };
 
@@ -40,7 +40,7 @@ struct IlluminationInfo {
   std::uint64_t sceneHash = 0;
   StoredTrainingSettings settings;
   std::uint64_t particles = 0;
-  double undersampledShare = 0;
+  double undersampledFraction = 0;
   float unit = 1;
 };
 

@@ -34,21 +34,17 @@ void checkRecord(const CacheRecord& r, std::size_t index, std::span<const CacheC
   require(weightsSumToOne(components.subspan(r.first, r.count)), "the weights do not sum to one");
 }
 
-LobeCacheInfo readInfo(const fb::LobeCache& cache) {
+LobeCacheInfo readInfo(const fb::LobeCache& cache, const std::string& file) {
   const fb::FitSettings& s = *cache.settings();
+  const std::optional<FitMethod> method = fitMethodOf(s.method() ? s.method()->string_view() : "");
+  if (!method) refuseDamaged(file, "its records were fitted by an unknown method");
   LobeCacheInfo info;
   info.toolVersion = cache.tool_version()->str();
   info.model = cache.model()->str();
   info.key = cache.key()->str();
   info.summary = cache.summary()->str();
   info.modelRevision = cache.model_revision();
-  info.settings = {s.method() ? s.method()->str() : "",
-                   s.components(),
-                   s.samples(),
-                   s.reduction(),
-                   s.revision(),
-                   s.quality(),
-                   s.fixed_grid()};
+  info.settings = {*method, s.components(), s.samples(), s.reduction(), s.revision(), s.quality(), s.fixed_grid()};
   info.gridKind = cache.grid_kind();
   info.gridCount = cache.grid_count();
   info.quarter = cache.quarter();
@@ -62,7 +58,7 @@ LobeCache::LobeCache(MappedFile file, const std::filesystem::path& path) : file_
   const std::span<const std::byte> payload = unwrapPayload(kLobeFormat, file_.bytes(), name);
   header_ = containerHeader(file_.bytes());
   const auto& cache = verifiedBuffer<fb::LobeCache>(payload, name, "lobe cache");
-  info_ = readInfo(cache);
+  info_ = readInfo(cache, name);
   records_ = inPlace<CacheRecord>(*cache.records());
   components_ = inPlace<CacheComponent>(*cache.components());
   if (info_.gridKind > kLastGridKind) refuseDamaged(name, fmt::format("grid of unknown kind {}", info_.gridKind));
@@ -82,6 +78,12 @@ LobeCache LobeCache::open(const std::filesystem::path& path) {
   return LobeCache(MappedFile(path), path);
 }
 
+std::optional<FitMethod> fitMethodOf(std::string_view name) {
+  const auto found = std::ranges::find(kFitMethodNames, name);
+  if (found == kFitMethodNames.end()) return std::nullopt;
+  return static_cast<FitMethod>(found - kFitMethodNames.begin());
+}
+
 std::string lobeFileName(const std::string& model, const std::string& key) {
   return fmt::format("{}-{:016x}.lobe", model, hashText(key));
 }
@@ -91,7 +93,7 @@ std::vector<std::byte> encodeLobeCache(const LobeCacheInfo& info, std::span<cons
                                        std::span<const std::uint32_t> lookup) {
   flatbuffers::FlatBufferBuilder builder(1024 + records.size_bytes() + components.size_bytes());
   const FitSettings& s = info.settings;
-  const auto settings = fb::CreateFitSettings(builder, builder.CreateString(s.method), s.components, s.samples,
+  const auto settings = fb::CreateFitSettings(builder, builder.CreateString(nameOf(s.method)), s.components, s.samples,
                                               s.reduction, s.revision, s.quality, s.fixedGrid);
   // One after the other: the order in which arguments of a call are evaluated is the compiler's choice.
   const auto toolVersion = builder.CreateString(info.toolVersion);

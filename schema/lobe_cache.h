@@ -1,11 +1,13 @@
 #pragma once
 // The BRDF cache: one fitted lobe in one file. See lobe.fbs for the meaning of each number.
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "schema/container.h"
@@ -23,8 +25,16 @@ struct CacheRecord {
   float integral, albedo, cosineMass, outside, nev, nevCoverage, worstRatio;
 };
 
+/// How the records of a cache were fitted; lobe_fit.h says what each is.
+enum class FitMethod { automatic, wem, ceres, eq8 };
+inline constexpr std::array<const char*, 4> kFitMethodNames{"auto", "wem", "ceres", "eq8"};
+inline const char* nameOf(FitMethod method) {
+  return kFitMethodNames[static_cast<std::size_t>(method)];
+}
+std::optional<FitMethod> fitMethodOf(std::string_view name);
+
 struct FitSettings {
-  std::string method = "wem";
+  FitMethod method = FitMethod::wem;
   std::uint32_t components = 8;
   std::uint32_t samples = 4096;
   float reduction = 0.1f;

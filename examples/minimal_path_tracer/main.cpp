@@ -1,17 +1,23 @@
-// A path tracer on spheres that samples directions by what a lobe::Field has learnt, compared with BSDF sampling at the
-// same number of samples. It has no next-event estimation, so that all light has to be found by chance or by guiding: a
-// lamp in a niche lights a room of diffuse spheres indirectly.
+// A path tracer on spheres that compares BSDF sampling, guiding by the illumination that a lobe::Field has learnt, and
+// the product of that illumination with a glossy lobe, at the same number of samples. It has no next-event estimation,
+// so that all light has to be found by chance or by guiding: a hidden lamp lights a room of diffuse and glossy spheres
+// indirectly.
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <filesystem>
 #include <limits>
 #include <numbers>
 #include <optional>
 #include <random>
+#include <string>
 #include <vector>
 
+#include <lobe/cache_set.h>
 #include <lobe/field.h>
+#include <lobe/fitting.h>
 #include <lobe/path_recorder.h>
 #include <lobe/surface_distribution.h>
 
@@ -45,16 +51,18 @@ Float3 grey(float value) {
   return {value, value, value};
 }
 
+/// Its BSDF is diffuse · kInvPi + glossy · glossyLobe.
 struct Sphere {
   Float3 centre;
-  float radius, albedo, emission;
+  float radius, diffuse, glossy, emission;
 };
 
 // The room is the inside of the first sphere. The last hides the lamp from the camera and from most of the room.
-const std::vector<Sphere> kSpheres = {{{0, 0, 0}, 4, 0.7f, 0},
-                                      {{-1.2f, -1, 0.5f}, 0.9f, 0.6f, 0},
-                                      {{0, 3.3f, 0}, 0.25f, 0, 60},
-                                      {{0, 2.2f, 0}, 0.8f, 0.7f, 0}};
+const std::vector<Sphere> kSpheres = {{{0, 0, 0}, 4, 0.7f, 0, 0},
+                                      {{-1.2f, -1, 0.5f}, 0.9f, 0.6f, 0, 0},
+                                      {{1.1f, -1.2f, 0.4f}, 1.1f, 0.1f, 0.8f, 0},
+                                      {{0, 3.3f, 0}, 0.25f, 0, 0, 60},
+                                      {{0, 2.2f, 0}, 0.8f, 0.7f, 0, 0}};
 
 struct Hit {
   float distance;
@@ -97,32 +105,92 @@ struct Frame {
   Float3 toLocal(Float3 v) const { return {dot(v, s), dot(v, t), dot(v, n)}; }
 };
 
-struct Direction {
-  Float3 wi;
-  float pdf;
+// The glossy lobe: Phong's, normalised to an albedo below one (Lafortune and Willems 1994).
+constexpr float kExponent = 60;
+
+Float3 mirrored(Float3 wo) {
+  return {-wo.x, -wo.y, wo.z};
+}
+
+float glossyLobe(Float3 wo, Float3 wi) {
+  const float cosine = dot(mirrored(wo), wi);
+  return wi.z > 0 && cosine > 0 ? (kExponent + 2) / (2 * kPi) * std::pow(cosine, kExponent) : 0;
+}
+
+float glossyPdf(Float3 wo, Float3 wi) {
+  const float cosine = dot(mirrored(wo), wi);
+  return cosine > 0 ? (kExponent + 1) / (2 * kPi) * std::pow(cosine, kExponent) : 0;
+}
+
+Float3 sampleGlossy(Float3 wo, Float2 u) {
+  const float cosine = std::pow(1 - u.x, 1 / (kExponent + 1)), phi = 2 * kPi * u.y;
+  const float sine = std::sqrt(std::max(0.0f, 1 - cosine * cosine));
+  return Frame(mirrored(wo)).toWorld({sine * std::cos(phi), sine * std::sin(phi), cosine});
+}
+
+/// The lobe as the fit needs it.
+lobe::LobeFunctions lobeFunctions() {
+  lobe::LobeFunctions functions;
+  functions.model = "phong";
+  functions.key = "phong exponent=" + std::to_string(kExponent);
+  functions.evaluate = [](Float3 wo, Float3 wi) { return glossyLobe(wo, wi); };
+  functions.sample = [](Float3 wo, Float2 u) -> std::optional<lobe::LobeDirection> {
+    const Float3 wi = normalized(sampleGlossy(wo, u));
+    if (wi.z <= 0) return std::nullopt;
+    return lobe::LobeDirection{wi, glossyPdf(wo, wi)};
+  };
+  functions.pdf = [](Float3 wo, Float3 wi) { return glossyPdf(wo, wi); };
+  return functions;
+}
+
+/// The BSDF of a sphere at a point, seen from wo (local).
+struct Bsdf {
+  float diffuse, glossy;
+  Float3 wo;
+
+  float glossyProbability() const { return glossy / (diffuse + glossy); }
+  float evaluate(Float3 wi) const { return diffuse / kPi + glossy * glossyLobe(wo, wi); }
+  float pdf(Float3 wi) const {
+    return glossyProbability() * glossyPdf(wo, wi) + (1 - glossyProbability()) * wi.z / kPi;
+  }
+  Float3 sample(float choice, Float2 u) const {
+    if (choice < glossyProbability()) return normalized(sampleGlossy(wo, u));
+    const float r = std::sqrt(u.x), phi = 2 * kPi * u.y;
+    return {r * std::cos(phi), r * std::sin(phi), std::sqrt(1 - u.x)};
+  }
 };
 
-/// Chooses between the diffuse BSDF's sampler and the field's mixtures; the density is that of both together.
-std::optional<Direction> sampleDirection(const lobe::SurfaceDistribution* guide, Random& random) {
+struct Direction {
+  Float3 wi;
+  float pdf, bsdfPdf;
+};
+
+/// Chooses between the BSDF's sampler and the mixtures; the density is that of both together.
+std::optional<Direction> sampleDirection(const Bsdf& bsdf, const lobe::SurfaceDistribution* guide, Random& random) {
   float choice = random();
   const Float2 u{random(), random()};
   const lobe::Strategy strategy = guide ? guide->choose(choice) : lobe::Strategy::bsdf;
   Float3 wi;
   if (strategy == lobe::Strategy::bsdf) {
-    const float r = std::sqrt(u.x), phi = 2 * kPi * u.y;
-    wi = {r * std::cos(phi), r * std::sin(phi), std::sqrt(1 - u.x)};
+    wi = bsdf.sample(choice, u);
   } else {
     const std::optional<lobe::GuidedSample> sample = guide->sample(strategy, choice, u);
     if (!sample) return std::nullopt;
     wi = sample->wi;
   }
   if (wi.z <= 0) return std::nullopt;
-  const float bsdfPdf = wi.z / kPi;
-  return Direction{wi, guide ? guide->bsdfProbability() * bsdfPdf + guide->guidedPdf(wi) : bsdfPdf};
+  const float bsdfPdf = bsdf.pdf(wi);
+  return Direction{wi, guide ? guide->bsdfProbability() * bsdfPdf + guide->guidedPdf(wi) : bsdfPdf, bsdfPdf};
 }
 
-/// The radiance along a ray. field: nullptr for plain path tracing; recorder: told of the path where training wants it.
-float radiance(Float3 origin, Float3 direction, const lobe::Field* field, lobe::SampleStorage* storage,
+/// What guides a path: nothing, the illumination, or its product with the compiled lobe.
+struct Guide {
+  const lobe::Field* field = nullptr;
+  const lobe::LobeCacheSet* caches = nullptr;
+};
+
+/// The radiance along a ray. recorder: told of the path where training wants it, with the storage that it writes to.
+float radiance(Float3 origin, Float3 direction, const Guide& guide, lobe::SampleStorage* storage,
                lobe::PathRecorder* recorder, Random& random) {
   float result = 0, throughput = 1;
   for (int depth = 0; depth < 12; ++depth) {
@@ -131,21 +199,24 @@ float radiance(Float3 origin, Float3 direction, const lobe::Field* field, lobe::
     if (!hit) break;
     result += throughput * hit->sphere->emission;
     if (recorder) recorder->addLight(grey(throughput * hit->sphere->emission));
-    if (hit->sphere->albedo <= 0) break;
+    if (hit->sphere->emission > 0) break;
 
     const Frame frame(hit->normal);
-    std::optional<lobe::SurfaceDistribution> guide;
-    if (field) {
-      guide.emplace(*field, lobe::ShadingPoint{hit->position, hit->normal, frame.s, frame.t, frame.n,
-                                               frame.toLocal(-1 * direction)});
-      if (guide->hasRecord())
-        guide->describe({.lobes = {}, .diffuseAlbedo = hit->sphere->albedo}, nullptr);
+    const Bsdf bsdf{hit->sphere->diffuse, hit->sphere->glossy, frame.toLocal(-1 * direction)};
+    std::optional<lobe::SurfaceDistribution> distribution;
+    if (guide.field) {
+      distribution.emplace(*guide.field,
+                           lobe::ShadingPoint{hit->position, hit->normal, frame.s, frame.t, frame.n, bsdf.wo});
+      const lobe::TintedLobe glossy{0, bsdf.glossy};
+      if (distribution->hasRecord())
+        distribution->describe({.lobes = {&glossy, bsdf.glossy > 0 ? 1u : 0u}, .diffuseAlbedo = bsdf.diffuse},
+                               guide.caches);
       else if (storage)
         storage->requestRecord(hit->position, hit->normal);
     }
-    const std::optional<Direction> next = sampleDirection(guide ? &*guide : nullptr, random);
+    const std::optional<Direction> next = sampleDirection(bsdf, distribution ? &*distribution : nullptr, random);
     if (!next) break;
-    const float weight = hit->sphere->albedo / kPi * next->wi.z / next->pdf;
+    const float weight = bsdf.evaluate(next->wi) * next->wi.z / next->pdf;
     throughput *= weight;
     origin = hit->position;
     direction = normalized(frame.toWorld(next->wi));
@@ -155,9 +226,10 @@ float radiance(Float3 origin, Float3 direction, const lobe::Field* field, lobe::
                            .direction = direction,
                            .wi = next->wi,
                            .pdf = next->pdf,
+                           .bsdfPdf = next->bsdfPdf,
                            .weight = grey(weight),
                            .throughput = grey(throughput)},
-                          guide ? &*guide : nullptr);
+                          distribution ? &*distribution : nullptr);
   }
   return result;
 }
@@ -172,11 +244,11 @@ Float3 cameraDirection(Random& random) {
   return normalized({0.8f * (random() - 0.5f), 0.8f * (random() - 0.5f), -1});
 }
 
-Estimate render(const lobe::Field* field, int samples) {
+Estimate render(const Guide& guide, int samples) {
   Random random(7);
   double sum = 0, squares = 0;
   for (int i = 0; i < samples; ++i) {
-    const double value = radiance(kCamera, cameraDirection(random), field, nullptr, nullptr, random);
+    const double value = radiance(kCamera, cameraDirection(random), guide, nullptr, nullptr, random);
     sum += value;
     squares += value * value;
   }
@@ -184,9 +256,7 @@ Estimate render(const lobe::Field* field, int samples) {
   return {mean, squares / samples - mean * mean};
 }
 
-}  // namespace
-
-int main() {
+lobe::Field train(const lobe::LobeCacheSet& caches) {
   lobe::FieldOptions options;
   options.sceneDiagonal = 8 * std::sqrt(3.0f);
   lobe::Field field(options);
@@ -196,18 +266,43 @@ int main() {
     Random random(100 + static_cast<std::uint64_t>(pass));
     for (std::uint64_t path = 0; path < 30000; ++path) {
       recorder.begin(path);
-      radiance(kCamera, cameraDirection(random), &field, &storage, &recorder, random);
+      radiance(kCamera, cameraDirection(random), {&field, &caches}, &storage, &recorder, random);
       recorder.end();
     }
     field.update(storage);
   }
-  std::printf("%zu records\n", field.records());
+  return field;
+}
+
+}  // namespace
+
+int main() {
+  const lobe::LobeFunctions glossy = lobeFunctions();
+  lobe::FittingOptions fitting;
+  fitting.folder = std::filesystem::temp_directory_path() / "minimal_path_tracer";
+  const lobe::CompiledLobe compiled = lobe::compileLobe(glossy, fitting);
+  std::printf("%s: %zu records, relative variance at most %.3f\n", compiled.file.filename().c_str(), compiled.records,
+              compiled.worstRelativeVariance);
+  const std::vector<lobe::LobeRequest> requests{{glossy.model, glossy.key, glossy.revision, "glossy sphere"}};
+  const lobe::LobeCacheSet caches(fitting.folder, requests, "run minimal_path_tracer again");
+
+  const lobe::Field field = train(caches);
+  std::printf("%zu illumination records\n", field.records());
+
   constexpr int kSamples = 200000;
-  const Estimate plain = render(nullptr, kSamples), guided = render(&field, kSamples);
-  std::printf("plain:  mean %.4f, variance %.3f\n", plain.mean, plain.variance);
-  std::printf("guided: mean %.4f, variance %.3f (%.2f of plain)\n", guided.mean, guided.variance,
-              guided.variance / plain.variance);
-  // The means agree within their noise, and guiding pays.
-  const double error = std::sqrt((plain.variance + guided.variance) / kSamples);
-  return std::abs(plain.mean - guided.mean) < 4 * error && guided.variance < plain.variance ? 0 : 1;
+  const Estimate plain = render({}, kSamples), guided = render({&field}, kSamples),
+                 product = render({&field, &caches}, kSamples);
+  const auto print = [&](const char* name, const Estimate& e) {
+    std::printf("%-8s mean %.4f, variance %.3f (%.2f of plain)\n", name, e.mean, e.variance,
+                e.variance / plain.variance);
+  };
+  print("plain", plain);
+  print("guided", guided);
+  print("product", product);
+  // The means agree within their noise, and each method is better than the one before it.
+  const auto agree = [&](const Estimate& e) {
+    return std::abs(plain.mean - e.mean) < 4 * std::sqrt((plain.variance + e.variance) / kSamples);
+  };
+  return agree(guided) && agree(product) && product.variance < guided.variance && guided.variance < plain.variance ? 0
+                                                                                                                   : 1;
 }

@@ -8,9 +8,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "runtime/mixture/lane_kernels.h"
-#include "runtime/mixture/lane_packing.h"
+#include "runtime/mixture/kernels.h"
 #include "runtime/mixture/lookup.h"
+#include "runtime/mixture/packing.h"
 
 namespace lobe {
 namespace {
@@ -41,13 +41,13 @@ BrdfCaches::Entry::Entry(LobeCache opened, float reduction)
     const std::span<const Gaussian> fitted = asGaussians(cache.components(r));
     Mixture mixture(fitted.begin(), fitted.end());
     if (reduction > 0) reduce(mixture, reduction);
-    const int count = static_cast<int>(mixture.size()), stride = paddedLanes(count);
+    const int count = static_cast<int>(mixture.size()), stride = paddedCount(count);
     records.push_back({toDisc(grid.direction(static_cast<int>(r.entry))), lanes.size(), stride, count,
                        r.integral / std::max(1.0f - r.outside, 0.1f), r.albedo, r.cosineMass});
-    lanes.resize(lanes.size() + static_cast<std::size_t>(stride) * kLaneFields);
-    packLanes(mixture, lanes.data() + records.back().first, stride);
+    lanes.resize(lanes.size() + static_cast<std::size_t>(stride) * kGaussianFields);
+    packGaussians(mixture, lanes.data() + records.back().first, stride);
   }
-  lanes.resize(lanes.size() + kMostLanes);  // kernels read whole sets of lanes
+  lanes.resize(lanes.size() + kMaxVectorLanes);  // kernels read whole sets of lanes
   if (grid.kind == GridKind::elevation) findSteps();
 }
 
@@ -95,9 +95,9 @@ void BrdfCaches::add(int lobe, const Vec3& wo, const Vec2& turn, float tint, Ref
   const Entry& entry = caches_[cacheOfRequest_[lobe]];
   const Mirror mirror = entry.cache.info().quarter ? Mirror::intoQuadrant(wo) : Mirror{};
   const Record& record = entry.nearest(mirror(wo));
-  const bool covered = record.count > 0 && record.count <= reflectance.gaussians.room();
-  (covered ? reflectance.albedo : reflectance.uncoveredAlbedo) += tint * record.albedo;
-  if (!covered) return;
+  const bool representable = record.count > 0 && record.count <= reflectance.gaussians.room();
+  (representable ? reflectance.albedo : reflectance.unrepresentableAlbedo) += tint * record.albedo;
+  if (!representable) return;
 
   Placement placement = placementOf({entry.grid.kind, record.reference, mirror}, wo);
   // Turned once more, by the sum of both angles.

@@ -10,7 +10,7 @@
 #include "lobe/cache_set.h"
 #include "runtime/guiding/reflectance.h"
 #include "runtime/mixture/grid.h"
-#include "runtime/mixture/lanes.h"
+#include "runtime/mixture/soa_gaussians.h"
 #include "schema/lobe_cache.h"
 
 namespace lobe {
@@ -44,7 +44,7 @@ class BrdfCaches {
     float albedo, cosineMass;
 
     /// The view of its components.
-    LanesView view(const std::vector<float>& lanes) const { return {lanes.data() + first, stride, count}; }
+    GaussiansView view(const std::vector<float>& lanes) const { return {lanes.data() + first, stride, count}; }
   };
   class Entry {
    public:

@@ -5,10 +5,10 @@
 
 #include <fmt/format.h>
 
+#include "runtime/core/atomic_file.h"
 #include "runtime/guiding/field_data.h"
 #include "runtime/guiding/illumination_store.h"
 #include "runtime/guiding/sample_storage_data.h"
-#include "schema/atomic_file.h"
 
 namespace lobe {
 namespace {
@@ -17,7 +17,7 @@ TrainingOptions trainingOptions(const FieldOptions& options) {
   TrainingOptions training;
   training.components = options.components;
   training.neighbours = options.neighbours;
-  training.unitShare = options.unitShare;
+  training.unitFraction = options.unitFraction;
   training.klThreshold = options.klThreshold;
   return training;
 }
@@ -69,7 +69,7 @@ void Field::save(const std::filesystem::path& path) const {
 std::optional<double> Field::update(const SampleStorage& storage) {
   IlluminationTrainer& trainer = trainerOf(*data_);
   return inOrder(*storage.data_, [&](const SampleStorageData& data) {
-    trainer.learnShares(data.fractions);
+    trainer.learnFractions(data.fractions);
     return trainer.learn(std::array{std::span<const Particle>(data.photons), std::span<const Particle>(data.samples)},
                          data.requests);
   });
@@ -101,8 +101,8 @@ double Field::meanComponents() const {
   return cache().meanComponents();
 }
 
-double Field::undersampledShare() const {
-  return data_->trainer ? data_->trainer->undersampledShare() : 0.0;
+double Field::undersampledFraction() const {
+  return data_->trainer ? data_->trainer->undersampledFraction() : 0.0;
 }
 
 const IlluminationCache& cacheOf(const Field& field) {

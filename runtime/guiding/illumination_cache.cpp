@@ -4,7 +4,7 @@
 #include <bit>
 #include <new>
 
-#include "runtime/mixture/lane_packing.h"
+#include "runtime/mixture/packing.h"
 
 namespace lobe {
 namespace {
@@ -51,7 +51,7 @@ void prefetch(const PackedRecord& record) {
   constexpr int kLine = 64;
   const auto* bytes = reinterpret_cast<const char*>(&record);
   // Of 8 lanes, which are most: asking the record how many it has would wait for it.
-  constexpr int kBytes = static_cast<int>(sizeof(PackedRecord)) + kLaneFields * kMaxLightComponents * 4;
+  constexpr int kBytes = static_cast<int>(sizeof(PackedRecord)) + kGaussianFields * kMaxLightComponents * 4;
   for (int i = 0; i < kBytes; i += kLine) __builtin_prefetch(bytes + i);
 }
 
@@ -103,29 +103,24 @@ std::vector<IlluminationCache::Placement> IlluminationCache::placeInCells() cons
 
 void IlluminationCache::pack(const IlluminationRecord& record) {
   static_assert(sizeof(PackedRecord) == sizeof(Block) && kMaxLightComponents == 8);
-  const int stride = record.count <= kLaneStep ? kLaneStep : kMaxLightComponents;
+  const int stride = PackedRecord::strideFor(record.count);
   const std::size_t first = blocks_.size();
   places_.push_back({record.position, record.normal, record.radius, static_cast<std::uint32_t>(first)});
   constexpr std::size_t kBlockFloats = sizeof(Block) / sizeof(float);
-  const std::size_t floats = static_cast<std::size_t>(stride) * kLaneFields;
+  const std::size_t floats = static_cast<std::size_t>(stride) * kGaussianFields;
   blocks_.resize(first + 1 + (floats + kBlockFloats - 1) / kBlockFloats);
   new (&blocks_[first]) PackedRecord{.tangent = record.tangent,
                                      .background = record.background,
                                      .irradiance = record.irradiance,
                                      .samples = record.samples,
-                                     .bsdfShare = record.bsdfShare,
-                                     .count = static_cast<std::uint16_t>(record.count),
-                                     .stride = static_cast<std::uint16_t>(stride)};
-  packLanes(record.gaussians(), blocks_[first + 1].floats.data(), stride);
-}
-
-std::size_t IlluminationCache::indexOf(const PackedRecord& record) const {
-  const auto block = static_cast<std::uint32_t>(reinterpret_cast<const Block*>(&record) - blocks_.data());
-  return static_cast<std::size_t>(std::ranges::lower_bound(places_, block, {}, &Place::block) - places_.begin());
+                                     .bsdfFraction = record.bsdfFraction,
+                                     .count = static_cast<std::uint32_t>(record.count) & 0xfu,
+                                     .index = static_cast<std::uint32_t>(places_.size() - 1) & 0xfffffffu};
+  packGaussians(record.gaussians(), blocks_[first + 1].floats.data(), stride);
 }
 
 IlluminationRecord IlluminationCache::unpacked(const PackedRecord& record) const {
-  const Place& place = places_[indexOf(record)];
+  const Place& place = places_[record.index];
   IlluminationRecord r{.position = place.position,
                        .normal = place.normal,
                        .tangent = record.tangent,
@@ -133,10 +128,10 @@ IlluminationRecord IlluminationCache::unpacked(const PackedRecord& record) const
                        .background = record.background,
                        .irradiance = record.irradiance,
                        .samples = record.samples,
-                       .bsdfShare = record.bsdfShare,
-                       .count = record.count,
+                       .bsdfFraction = record.bsdfFraction,
+                       .count = static_cast<std::int32_t>(record.count),
                        .components = {}};
-  std::ranges::copy(unpackLanes(record.lanes()), r.components.begin());
+  std::ranges::copy(unpackGaussians(record.gaussians()), r.components.begin());
   return r;
 }
 

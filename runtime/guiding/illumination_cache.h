@@ -3,14 +3,16 @@
 // that serves a point (Vorba et al. 2014, Section 5). Frozen: read by any number of threads without locks.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <vector>
 
 #include <Eigen/Geometry>
 
 #include "runtime/mixture/gaussian.h"
-#include "runtime/mixture/lanes.h"
+#include "runtime/mixture/soa_gaussians.h"
 
 namespace lobe {
 
@@ -18,30 +20,53 @@ namespace lobe {
 /// which records are made and stored.
 struct IlluminationRecord {
   Vec3 position;
-  Vec3 normal;       ///< unit
-  Vec3 tangent;      ///< unit, orthogonal to normal
-  float radius;      ///< world units, the record serves points within
-  float background;  ///< u in [0,1]
-  float irradiance;  ///< ∫ L cosθ, from all light, in units that are the same for all records; 0: not known
-  float samples;     ///< particles seen in training
-  float bsdfShare;   ///< of the BSDF in the product's density, see SelectionShare
+  Vec3 normal;         ///< unit
+  Vec3 tangent;        ///< unit, orthogonal to normal
+  float radius;        ///< world units, the record serves points within
+  float background;    ///< u in [0,1]
+  float irradiance;    ///< ∫ L cosθ, from all light, in units that are the same for all records; 0: not known
+  float samples;       ///< particles seen in training
+  float bsdfFraction;  ///< of the BSDF in the product's density, see BsdfSamplingFraction
   std::int32_t count = 0;
   std::array<Gaussian, kMaxLightComponents> components;  ///< weights sum to 1
 
   std::span<const Gaussian> gaussians() const { return {components.data(), static_cast<std::size_t>(count)}; }
 };
 
-/// What sampling needs of a record, in one run of memory: the Gaussians' lanes follow the header.
+/// What sampling needs of a record: a header that its Gaussians follow in memory.
 struct alignas(32) PackedRecord {
   Vec3 tangent;
   float background;
   float irradiance;
   float samples;
-  float bsdfShare;
-  std::uint16_t count;   ///< Gaussians
-  std::uint16_t stride;  ///< 4 or 8 lanes
+  float bsdfFraction;
+  std::uint32_t count : 4;   ///< Gaussians
+  std::uint32_t index : 28;  ///< of the record in its cache, in the order that records were given in
 
-  LanesView lanes() const { return {reinterpret_cast<const float*>(this + 1), stride, count}; }
+  static constexpr int strideFor(int count) {
+    return count <= kPaddingMultiple ? kPaddingMultiple : kMaxLightComponents;
+  }
+  GaussiansView gaussians() const {
+    const int number = static_cast<int>(count);
+    return {reinterpret_cast<const float*>(this + 1), strideFor(number), number};
+  }
+  /// Of the header and the Gaussians.
+  std::size_t bytes() const {
+    return sizeof(PackedRecord) + sizeof(float) * kGaussianFields * static_cast<std::size_t>(gaussians().stride);
+  }
+};
+
+/// A copy of a record with its Gaussians, which does not depend on the cache that it came from.
+class RecordCopy {
+ public:
+  void assign(const PackedRecord& record) { std::memcpy(memory_.data(), &record, record.bytes()); }
+  /// After assign.
+  const PackedRecord& operator*() const { return *reinterpret_cast<const PackedRecord*>(memory_.data()); }
+  const PackedRecord* operator->() const { return &**this; }
+
+ private:
+  static constexpr std::size_t kBytes = sizeof(PackedRecord) + sizeof(float) * kGaussianFields * kMaxLightComponents;
+  alignas(PackedRecord) std::array<std::byte, kBytes> memory_;
 };
 
 class IlluminationCache {
@@ -55,8 +80,6 @@ class IlluminationCache {
   const PackedRecord* find(const Vec3& x, const Vec3& n) const;
 
   std::size_t size() const { return places_.size(); }
-  /// The place of a record of this cache in the order that they were given in.
-  std::size_t indexOf(const PackedRecord& record) const;
   /// A record of this cache as it was given, to the bit.
   IlluminationRecord unpacked(const PackedRecord& record) const;
   /// All records as they were given.

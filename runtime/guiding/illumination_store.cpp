@@ -23,7 +23,7 @@ StoredIllumination stored(const IlluminationRecord& r, std::size_t first) {
           .background = r.background,
           .irradiance = r.irradiance,
           .samples = r.samples,
-          .bsdfShare = r.bsdfShare,
+          .bsdfFraction = r.bsdfFraction,
           .first = static_cast<std::uint32_t>(first),
           .count = static_cast<std::uint32_t>(r.count)};
 }
@@ -36,7 +36,7 @@ IlluminationRecord loaded(const StoredIllumination& s, std::span<const CacheComp
                             .background = s.background,
                             .irradiance = s.irradiance,
                             .samples = s.samples,
-                            .bsdfShare = s.bsdfShare,
+                            .bsdfFraction = s.bsdfFraction,
                             .count = static_cast<std::int32_t>(s.count),
                             .components = {}};
   std::ranges::transform(components, record.components.begin(), [](const CacheComponent& c) {

@@ -77,12 +77,12 @@ std::vector<RecordRequest> takeApart(std::vector<RecordRequest>& waiting, float 
 void TrainingOptions::validate() const {
   require(components >= 1 && components <= kMaxIlluminationComponents / 2, "components", "1 to 8");
   require(neighbours >= 1, "neighbours", "at least 1");
-  require(unitShare > 0 && unitShare <= 1, "unit-share", "over 0 and at most 1");
+  require(unitFraction > 0 && unitFraction <= 1, "unit-share", "over 0 and at most 1");
   require(klThreshold > 0, "kl-threshold", "over 0");
 }
 
 IlluminationTrainer::IlluminationTrainer(const TrainingOptions& options, float sceneDiagonal)
-    : options_(options), unit_(options.unitShare * sceneDiagonal) {
+    : options_(options), unit_(options.unitFraction * sceneDiagonal) {
   options.validate();
 }
 
@@ -101,10 +101,10 @@ void IlluminationTrainer::fill(std::span<const std::span<const Particle>> source
   if (!neighbours.empty()) makeRecords(neighbours, requests);
 }
 
-void IlluminationTrainer::learnShares(std::span<const ShareSample> samples) {
-  std::vector<std::vector<ShareSample>> ofRecord(records_.size());
-  for (const ShareSample& s : samples) ofRecord[s.record].push_back(s);
-  parallelFor(std::size_t{0}, records_.size(), [&](std::size_t i) { records_[i].share.learn(ofRecord[i]); });
+void IlluminationTrainer::learnFractions(std::span<const FractionSample> samples) {
+  std::vector<std::vector<FractionSample>> ofRecord(records_.size());
+  for (const FractionSample& s : samples) ofRecord[s.record].push_back(s);
+  parallelFor(std::size_t{0}, records_.size(), [&](std::size_t i) { records_[i].fraction.learn(ofRecord[i]); });
 }
 
 std::optional<double> IlluminationTrainer::updateAll(const ParticleNeighbours& neighbours) {
@@ -165,7 +165,7 @@ std::optional<IlluminationTrainer::Training> IlluminationTrainer::makeRecord(con
                   found.distance,
                   found.irradiance,
                   1,
-                  StepwiseEm(options_.components, options_.em),
+                  StepwiseEm(options_.components),
                   {}};
   record.em.fit(found.points);
   shrinkRadius(record);
@@ -199,14 +199,14 @@ void IlluminationTrainer::rebuildCache() {
     r.background = t.em.background();
     r.irradiance = t.irradiance;
     r.samples = static_cast<float>(t.em.samplesSeen());
-    r.bsdfShare = t.share.bsdf();
+    r.bsdfFraction = t.fraction.bsdf();
     r.count = static_cast<std::int32_t>(t.em.gaussians().size());
     std::ranges::copy(t.em.gaussians(), r.components.begin());
   }
   cache_ = IlluminationCache(records, unit_);
 }
 
-double IlluminationTrainer::undersampledShare() const {
+double IlluminationTrainer::undersampledFraction() const {
   if (records_.empty()) return 0;
   const int limit = kUndersampledPerComponent * options_.components;
   const auto few = std::ranges::count_if(records_, [&](const Training& t) { return t.em.samplesSeen() < limit; });

@@ -8,19 +8,18 @@
 #include <span>
 #include <vector>
 
+#include "runtime/guiding/bsdf_sampling_fraction.h"
 #include "runtime/guiding/illumination_cache.h"
 #include "runtime/guiding/particle_neighbours.h"
-#include "runtime/guiding/selection_share.h"
 #include "runtime/mixture/em.h"
 
 namespace lobe {
 
 struct TrainingOptions {
-  int components = 8;        ///< Gaussians a record, 1 to 8
-  int neighbours = 250;      ///< particles of each source that a record is updated from, at most
-  float unitShare = 0.02f;   ///< the length u, as a share of the scene's bounding-box diagonal
-  float klThreshold = 5.0f;  ///< κ, how far in standard deviations a component may move before a record is invalid
-  StepwiseEmOptions em;
+  int components = 8;          ///< Gaussians a record, 1 to 8
+  int neighbours = 250;        ///< particles of each source that a record is updated from, at most
+  float unitFraction = 0.02f;  ///< the length u, as a share of the scene's bounding-box diagonal
+  float klThreshold = 5.0f;    ///< κ, how far in standard deviations a component may move before a record is invalid
 
   /// Throws std::runtime_error that names the field.
   void validate() const;
@@ -39,7 +38,7 @@ class IlluminationTrainer {
                               std::span<const RecordRequest> requests);
 
   /// Learns the records' shares of the BSDF. The samples are of records in cache() as it is.
-  void learnShares(std::span<const ShareSample> samples);
+  void learnFractions(std::span<const FractionSample> samples);
 
   /// Makes records for requests that none serves from particles that the others have already learnt from.
   void fill(std::span<const std::span<const Particle>> sources, std::span<const RecordRequest> requests);
@@ -49,7 +48,7 @@ class IlluminationTrainer {
 
   float unit() const { return unit_; }
   /// Share of records that have seen fewer than 5 particles a component.
-  double undersampledShare() const;
+  double undersampledFraction() const;
 
  private:
   struct Training {
@@ -59,7 +58,7 @@ class IlluminationTrainer {
     float irradiance;  // mean over the passes since it was made
     int passes;
     StepwiseEm em;
-    SelectionShare share;
+    BsdfSamplingFraction fraction;
   };
 
   std::optional<double> updateAll(const ParticleNeighbours& neighbours);

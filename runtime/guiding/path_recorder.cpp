@@ -43,9 +43,9 @@ void PathRecorder::addVertex(const RecordedVertex& recorded, const SurfaceDistri
           0,
           std::nullopt};
   if (!options_.fractions || !distribution || !distribution->learnsFraction()) return;
-  const ShareSample share = distribution->impl().shareSample(toEigen(recorded.wi), recorded.bsdfPdf);
+  const FractionSample fraction = distribution->impl().fractionSample(toEigen(recorded.wi), recorded.bsdfPdf);
   const Rgb weight = toEigen(recorded.weight).array();
-  last.fraction = {share.record, share.bsdf, share.mixtures, share.covered, luminance(weight)};
+  last.fraction = {fraction.record, fraction.bsdf, fraction.mixtures, fraction.representable, luminance(weight)};
 }
 
 void PathRecorder::setDistance(float distance) {
@@ -73,7 +73,7 @@ void PathRecorder::end() {
     const float fractionWeight = v.fraction->weight * v.radiance;
     if (usable(fractionWeight))
       data.fractions.push_back(
-          {v.fraction->record, v.fraction->bsdfPdf, v.fraction->mixturePdf, v.fraction->covered, fractionWeight});
+          {v.fraction->record, v.fraction->bsdfPdf, v.fraction->mixturePdf, v.fraction->representable, fractionWeight});
   }
   count_ = 0;
 }

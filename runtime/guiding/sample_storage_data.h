@@ -5,15 +5,15 @@
 #include <vector>
 
 #include "lobe/sample_storage.h"
+#include "runtime/guiding/bsdf_sampling_fraction.h"
 #include "runtime/guiding/particle.h"
-#include "runtime/guiding/selection_share.h"
 
 namespace lobe {
 
 struct SampleStorageData {
-  std::vector<Particle> photons;       ///< of photons, of a density in flux per area
-  std::vector<Particle> samples;       ///< of camera paths
-  std::vector<ShareSample> fractions;  ///< of camera paths, for the BSDF sampling fraction
+  std::vector<Particle> photons;          ///< of photons, of a density in flux per area
+  std::vector<Particle> samples;          ///< of camera paths
+  std::vector<FractionSample> fractions;  ///< of camera paths, for the BSDF sampling fraction
   std::vector<RecordRequest> requests;
 
   /// Where the samples of a path begin in each of the lists; they end where the next path's begin.

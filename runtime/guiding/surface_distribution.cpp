@@ -16,7 +16,7 @@ constexpr float kInvPi = std::numbers::inv_pi_v<float>;
 // Records that have seen less than five particles for each of eight components know little, and illumination of which
 // less than this fraction has a shape is sampled by the BSDF as well as by a product.
 constexpr float kUndersampled = 40;
-constexpr float kEvenBackground = 0.98f;
+constexpr float kUniformBackground = 0.98f;
 
 /// The frame in which both factors of the product are given, as seen from the shading frame: z is the shading normal on
 /// the side of wo, x the record's tangent made orthogonal to it. So records need no turning on flat surfaces.
@@ -31,24 +31,25 @@ Eigen::Matrix3f guidingAxes(const ShadingPoint& point, const PackedRecord& recor
 }
 
 /// Samples for what the mixtures do not know are the BSDF's: light that goes through the surface, lobes too narrow.
-StrategyShares onCovered(const StrategyShares& shares, float covered) {
-  return {covered * shares.product, 1 - covered * (shares.product + shares.illumination),
-          covered * shares.illumination};
+StrategyProbabilities onRepresentable(const StrategyProbabilities& probabilities, float representable) {
+  return {representable * probabilities.product,
+          1 - representable * (probabilities.product + probabilities.illumination),
+          representable * probabilities.illumination};
 }
 
 /// The fraction of reflection that the mixtures describe.
-float coveredShare(const Reflectance& reflectance) {
-  const float all = reflectance.albedo + reflectance.uncoveredAlbedo;
+float representableFraction(const Reflectance& reflectance) {
+  const float all = reflectance.albedo + reflectance.unrepresentableAlbedo;
   return all > 0 ? reflectance.albedo / all : 1.0f;
 }
 
 }  // namespace
 
 GuidingDecision SurfaceDistribution::Impl::decide() const {
-  if (covered <= 0) return GuidingDecision::narrow;
+  if (representable <= 0) return GuidingDecision::tooNarrow;
   if (!product) return GuidingDecision::illumination;
   if (record->samples < kUndersampled) return GuidingDecision::undersampled;
-  if (record->background > kEvenBackground) return GuidingDecision::even;
+  if (record->background > kUniformBackground) return GuidingDecision::uniform;
   return reflectance.gaussians.count() > 0 ? GuidingDecision::product : GuidingDecision::illumination;
 }
 
@@ -64,23 +65,27 @@ void SurfaceDistribution::Impl::collectReflectance(const SurfaceReflectance& giv
     if (lobe.tint > 0) caches.add(lobe.lobe, above, turn, lobe.tint, reflectance);
 }
 
-ShareSample SurfaceDistribution::Impl::shareSample(const Vec3& wi, float bsdfPdf) const {
-  const float divided = covered * (1 - record->bsdfShare);  // the mixtures' with the background that is the BSDF's
-  const float background = density->bsdfShare() - (1 - divided);
+FractionSample SurfaceDistribution::Impl::fractionSample(const Vec3& wi, float bsdfPdf) const {
+  const float divided =
+      representable * (1 - record->bsdfFraction);  // the mixtures' with the background that is the BSDF's
+  const float background = density->bsdfFraction() - (1 - divided);
   const float mixtures = (std::max(0.0f, background) * bsdfPdf + density->guidedPdf(axes * wi)) / divided;
-  return {cache->indexOf(*record), bsdfPdf, mixtures, covered};
+  return {record->index, bsdfPdf, mixtures, representable};
 }
 
 SurfaceDistribution::SurfaceDistribution(const Field& field, const ShadingPoint& point) {
-  static_assert(kProductShares.bsdf == kInitialBsdfFraction);
+  static_assert(kProductProbabilities.bsdf == kInitialBsdfFraction);
   static_assert(sizeof(Impl) <= kBytes && alignof(Impl) <= kAlignment && std::is_trivially_destructible_v<Impl>);
-  // Default-initialised: the lanes of the reflectance stay as they are until they are filled.
+  const float side = point.wo.z >= 0 ? 1.0f : -1.0f;
+  const PackedRecord* record = field.cache().find(toEigen(point.position), side * toEigen(point.normal));
+  if (!record) return;
+  hasRecord_ = true;
+  // Default-initialised: the Gaussians of the reflectance and of the record are left as they are until they are set.
   Impl& self = *new (storage_) Impl;
-  self.cache = &field.cache();
   self.wo = toEigen(point.wo);
-  self.side = point.wo.z >= 0 ? 1.0f : -1.0f;
-  self.record = self.cache->find(toEigen(point.position), self.side * toEigen(point.normal));
-  if (self.record) self.axes = guidingAxes(point, *self.record, self.side);
+  self.side = side;
+  self.record.assign(*record);
+  self.axes = guidingAxes(point, *record, side);
 }
 
 SurfaceDistribution::Impl& SurfaceDistribution::impl() {
@@ -91,35 +96,20 @@ const SurfaceDistribution::Impl& SurfaceDistribution::impl() const {
   return *std::launder(reinterpret_cast<const Impl*>(storage_));
 }
 
-bool SurfaceDistribution::hasRecord() const {
-  return impl().record != nullptr;
-}
-
 void SurfaceDistribution::describe(const SurfaceReflectance& reflectance, const LobeCacheSet* caches) {
   Impl& self = impl();
   self.product = caches != nullptr;
-  self.described = reflectance.undescribedShare <= 0;
+  self.described = reflectance.undescribedFraction <= 0;
   if (self.product) self.collectReflectance(reflectance, *caches->caches_);
-  self.covered = (1 - reflectance.undescribedShare) * coveredShare(self.reflectance);
-  self.decision = self.decide();
-  const bool halves = !self.product || self.decision == GuidingDecision::undersampled;
-  if (self.decision != GuidingDecision::narrow && self.decision != GuidingDecision::even)
-    self.density.emplace(self.reflectance, *self.record,
-                         onCovered(halves ? kGuidedShares : productShares(self.record->bsdfShare), self.covered));
-}
-
-GuidingDecision SurfaceDistribution::decision() const {
-  return impl().decision;
-}
-
-float SurfaceDistribution::bsdfProbability() const {
-  const Impl& self = impl();
-  return self.density ? self.density->bsdfShare() : 1.0f;
-}
-
-Strategy SurfaceDistribution::choose(float& choice) const {
-  const Impl& self = impl();
-  return self.density ? self.density->choose(choice) : Strategy::bsdf;
+  self.representable = (1 - reflectance.undescribedFraction) * representableFraction(self.reflectance);
+  decision_ = self.decide();
+  if (decision_ == GuidingDecision::tooNarrow || decision_ == GuidingDecision::uniform) return;
+  const bool halves = !self.product || decision_ == GuidingDecision::undersampled;
+  const StrategyProbabilities probabilities =
+      halves ? kGuidedProbabilities : productProbabilities(self.record->bsdfFraction);
+  self.density.emplace(self.reflectance, *self.record, onRepresentable(probabilities, self.representable));
+  bsdfProbability_ = self.density->bsdfFraction();
+  productOfGuided_ = self.density->productOfGuided();
 }
 
 std::optional<GuidedSample> SurfaceDistribution::sample(Strategy strategy, float choice, const Float2& u) const {
@@ -130,22 +120,24 @@ std::optional<GuidedSample> SurfaceDistribution::sample(Strategy strategy, float
 }
 
 float SurfaceDistribution::guidedPdf(const Float3& wi) const {
+  if (bsdfProbability_ >= 1) return 0;
   const Impl& self = impl();
-  return self.density ? self.density->guidedPdf(self.axes * toEigen(wi)) : 0.0f;
+  return self.density->guidedPdf(self.axes * toEigen(wi));
 }
 
 std::optional<float> SurfaceDistribution::reflectedRadiance(float albedo) const {
+  if (!hasRecord_) return std::nullopt;
   const Impl& self = impl();
   // Nothing is known of what lobes without a fit reflect.
-  if (!self.record || !(self.record->irradiance > 0) || !self.described) return std::nullopt;
+  if (!(self.record->irradiance > 0) || !self.described) return std::nullopt;
   if (!self.product) return self.record->irradiance * albedo * kInvPi;
-  const bool shaped = self.decision == GuidingDecision::product || self.decision == GuidingDecision::illumination;
-  return self.record->irradiance * (self.reflectance.uncoveredAlbedo * kInvPi +
+  const bool shaped = decision_ == GuidingDecision::product || decision_ == GuidingDecision::illumination;
+  return self.record->irradiance * (self.reflectance.unrepresentableAlbedo * kInvPi +
                                     (shaped ? self.density->reflected() : self.reflectance.backgroundMass));
 }
 
 bool SurfaceDistribution::learnsFraction() const {
-  return impl().learnsFraction();
+  return decision_ == GuidingDecision::product || (decision_ == GuidingDecision::illumination && impl().product);
 }
 
 }  // namespace lobe

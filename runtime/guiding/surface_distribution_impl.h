@@ -4,21 +4,19 @@
 #include <optional>
 
 #include "lobe/surface_distribution.h"
+#include "runtime/guiding/bsdf_sampling_fraction.h"
 #include "runtime/guiding/guided_density.h"
 #include "runtime/guiding/illumination_cache.h"
 #include "runtime/guiding/reflectance.h"
-#include "runtime/guiding/selection_share.h"
 
 namespace lobe {
 
 struct SurfaceDistribution::Impl {
-  const IlluminationCache* cache;
-  const PackedRecord* record;  // nullptr: none serves the point, and density is empty
+  RecordCopy record;  // empty: none serves the point, and density is empty
   Vec3 wo;
-  Eigen::Matrix3f axes;  // from the shading frame to the frame of the guiding mixtures
-  float side = 1;        // 1 where wo is in front, −1 on the back
-  float covered = 0;     // fraction of samples that mixtures may draw
-  GuidingDecision decision = GuidingDecision::noRecord;
+  Eigen::Matrix3f axes;     // from the shading frame to the frame of the guiding mixtures
+  float side = 1;           // 1 where wo is in front, −1 on the back
+  float representable = 0;  // fraction of samples that mixtures may draw
   bool product = false;
   bool described = false;  // the reflectance is all that is reflected
   Reflectance reflectance;
@@ -26,12 +24,8 @@ struct SurfaceDistribution::Impl {
 
   void collectReflectance(const SurfaceReflectance& given, const BrdfCaches& caches);
   GuidingDecision decide() const;
-  /// Whether directions at this point tell of the record's BSDF sampling fraction.
-  bool learnsFraction() const {
-    return decision == GuidingDecision::product || (product && decision == GuidingDecision::illumination);
-  }
-  /// What a direction tells of it, but for its weight. Only where learnsFraction().
-  ShareSample shareSample(const Vec3& wi, float bsdfPdf) const;
+  /// What a direction tells of the record's BSDF sampling fraction, but for its weight. Only where learnsFraction().
+  FractionSample fractionSample(const Vec3& wi, float bsdfPdf) const;
 };
 
 }  // namespace lobe

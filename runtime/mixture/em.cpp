@@ -28,12 +28,12 @@ struct Block {
   Lane x{}, y{}, slope{}, along{}, across{};
   Lane mass{}, sx{}, sy{}, sxx{}, sxy{}, syy{};  // moments about the present mean: narrow lobes lose no digits
   Lane log{};                                    // density of the point at hand
-  std::array<float, kLanes> share{};
+  std::array<float, kLanes> responsibility{};
 
   Block() { logScale.fill(-kInfinity); }
   void set(std::size_t k, const Gaussian& g);
   double logDensities(double px, double py);
-  double shares(double largest);
+  double responsibilities(double largest);
   void add(double px, double py, double scale);
   void maximise(std::size_t k, double totalWeight, double minVariance, Gaussian& g) const;
 };
@@ -58,14 +58,14 @@ double Block::logDensities(double px, double py) {
 }
 
 // The densities relative to the largest of all; returns their sum.
-double Block::shares(double largest) {
-  for (std::size_t k = 0; k < kLanes; ++k) share[k] = expNegative(static_cast<float>(log[k] - largest));
-  return std::accumulate(share.begin(), share.end(), 0.0);
+double Block::responsibilities(double largest) {
+  for (std::size_t k = 0; k < kLanes; ++k) responsibility[k] = expNegative(static_cast<float>(log[k] - largest));
+  return std::accumulate(responsibility.begin(), responsibility.end(), 0.0);
 }
 
 void Block::add(double px, double py, double scale) {
   for (std::size_t k = 0; k < kLanes; ++k) {
-    const double q = scale * share[k], dx = px - x[k], dy = py - y[k];
+    const double q = scale * responsibility[k], dx = px - x[k], dy = py - y[k];
     mass[k] += q;
     sx[k] += q * dx;
     sy[k] += q * dy;
@@ -91,7 +91,7 @@ void Block::maximise(std::size_t k, double totalWeight, double minVariance, Gaus
 double expectation(const WeightedPoint& point, std::vector<Block>& blocks) {
   double largest = -kInfinity, sum = 0;
   for (Block& b : blocks) largest = std::max(largest, b.logDensities(point.y.x(), point.y.y()));
-  for (Block& b : blocks) sum += b.shares(largest);
+  for (Block& b : blocks) sum += b.responsibilities(largest);
   for (Block& b : blocks) b.add(point.y.x(), point.y.y(), point.weight / sum);
   return largest + std::log(sum);
 }

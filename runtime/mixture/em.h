@@ -31,21 +31,6 @@ int weightedEm(std::span<const WeightedPoint> points, Mixture& mixture, const We
 double meanLogLikelihood(std::span<const WeightedPoint> points, std::span<const Gaussian> mixture,
                          float background = 0);
 
-/// Priors and step sizes of the on-line form; the names are those of Vorba et al. 2014, Eq. 8–11.
-struct StepwiseEmOptions {
-  float stepExponent = 0.7f;  ///< η = (k+1)^(−exponent)
-  int samplesPerUpdate = 10;  ///< M step after this many samples
-  float priorA = 0.01f;
-  float priorB = 4e-3f;
-  float priorV = 0.01f;
-  float backgroundPrior = 8.0f;  ///< Dirichlet pseudo-count of the background component
-  float initialBackground = 0.5f;
-  float initialVariance = 0.04f;  ///< of every component at the start of the first fit
-  float minDeterminant = 1e-11f;  ///< its square root is the floor of each eigenvalue of Σ
-  double tolerance = 3e-3;        ///< the first fit ends at a smaller change of the mean log-likelihood (nats)
-  int maxSweeps = 250;            ///< of the first fit
-};
-
 /// An illumination mixture in training: u · 2cosθ/π + (1−u) · Σ π_k N_k over the disc, with its sufficient statistics.
 /// The background component 2cosθ/π (cosθ = 1 − |y|²) is what constant radiance makes of L cosθ.
 ///
@@ -55,8 +40,19 @@ struct StepwiseEmOptions {
 /// too: every sweep strides over them.
 class StepwiseEm {
  public:
+  // The names of the priors are those of Vorba et al. 2014, Eq. 8 to 11.
+  static constexpr float kStepExponent = 0.7f;  ///< η = (k+1)^(−exponent)
+  static constexpr int kSamplesPerUpdate = 10;  ///< samples between two M steps
+  static constexpr float kPriorA = 0.01f, kPriorB = 4e-3f, kPriorV = 0.01f;
+  static constexpr float kBackgroundPrior = 8.0f;  ///< Dirichlet pseudo-count of the background component
+  static constexpr float kInitialBackground = 0.5f;
+  static constexpr float kInitialVariance = 0.04f;  ///< of every component at the start of the first fit
+  static constexpr float kMinDeterminant = 1e-11f;  ///< its square root is the floor of each eigenvalue of Σ
+  static constexpr double kTolerance = 3e-3;  ///< change of the mean log-likelihood (nats) that ends the first fit
+  static constexpr int kMaxSweeps = 250;      ///< of the first fit
+
   /// components Gaussians, 1 ≤ components ≤ kMaxIlluminationComponents.
-  StepwiseEm(int components, const StepwiseEmOptions& options);
+  explicit StepwiseEm(int components);
 
   /// First fit, from nothing: starts from the points themselves (deterministically) and sweeps until the likelihood
   /// settles. The samples seen become the number of points that count; if there is none, nothing changes. Priors weigh
@@ -83,7 +79,6 @@ class StepwiseEm {
   void spread(std::span<const WeightedPoint> points);
   double sweep(std::span<const WeightedPoint> points, double evidenceBefore, double evidenceAfter);
 
-  StepwiseEmOptions options_;
   Mixture gaussians_;
   float background_;
   std::vector<Statistics> statistics_;

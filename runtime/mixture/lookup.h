@@ -5,7 +5,7 @@
 
 #include "runtime/mixture/gaussian.h"
 #include "runtime/mixture/grid.h"
-#include "runtime/mixture/lane_kernels.h"
+#include "runtime/mixture/kernels.h"
 
 namespace lobe {
 

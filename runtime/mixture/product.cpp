@@ -28,10 +28,10 @@ Vec2 standardNormal(const Vec2& u) {
 /// One component by the numbers that a product is made of; d is the variance of y at a given x.
 struct Factor {
   float x, y, slope, xx, d;
-  Factor(const LanesView& mixture, int k) {
-    const auto at = [&](LaneField f) { return mixture.field(f)[k]; };
-    x = at(LaneField::x), y = at(LaneField::y), slope = at(LaneField::slope), xx = at(LaneField::xx);
-    d = at(LaneField::conditional);
+  Factor(const GaussiansView& mixture, int k) {
+    const auto at = [&](GaussianField f) { return mixture.field(f)[k]; };
+    x = at(GaussianField::x), y = at(GaussianField::y), slope = at(GaussianField::slope), xx = at(GaussianField::xx);
+    d = at(GaussianField::conditional);
   }
   float ridge(float px) const { return y + slope * (px - x); }
 };
@@ -46,22 +46,22 @@ Vec2 samplePair(const Factor& one, const Factor& two, const Vec2& normal) {
   const float inverse = 1.0f / determinant;
   const float shift = (one.xx * across * apart - wide * bend * gap) * inverse;
   const float x = one.x + shift + std::sqrt(wide * across * inverse) * normal.x();
-  const float share = one.d / across;
-  const float ridge = one.ridge(x) + share * (two.ridge(x) - one.ridge(x));
-  return {x, ridge + std::sqrt(share * two.d) * normal.y()};
+  const float fraction = one.d / across;
+  const float ridge = one.ridge(x) + fraction * (two.ridge(x) - one.ridge(x));
+  return {x, ridge + std::sqrt(fraction * two.d) * normal.y()};
 }
 
 }  // namespace
 
-Vec2 sampleLane(const LanesView& mixture, int k, const Vec2& u) {
+Vec2 sampleLane(const GaussiansView& mixture, int k, const Vec2& u) {
   const Factor g(mixture, k);
   const Vec2 normal = standardNormal(u);
   const float x = g.x + std::sqrt(g.xx) * normal.x();
   return {x, g.ridge(x) + std::sqrt(g.d) * normal.y()};
 }
 
-Vec2 sampleLanes(const LanesView& mixture, float choice, const Vec2& u) {
-  const float* weights = mixture.field(LaneField::weight);
+Vec2 sampleGaussians(const GaussiansView& mixture, float choice, const Vec2& u) {
+  const float* weights = mixture.field(GaussianField::weight);
   float total = 0;
   for (int k = 0; k < mixture.count; ++k) total += weights[k];
   float left = choice * total;
@@ -76,7 +76,7 @@ Vec2 sampleLanes(const LanesView& mixture, float choice, const Vec2& u) {
   return sampleLane(mixture, chosen, u);
 }
 
-Product::Product(const LanesView& reflectance, float constant, const LanesView& light)
+Product::Product(const GaussiansView& reflectance, float constant, const GaussiansView& light)
     : reflectance_(reflectance), light_(light), constant_(constant) {
   const float sum = pairMasses(reflectance, constant, light, pairs_.data(), columns_.data());
   // The comparison is false for NaN as well.

@@ -9,7 +9,7 @@
 #include <array>
 
 #include "runtime/mixture/disc.h"
-#include "runtime/mixture/lane_kernels.h"
+#include "runtime/mixture/kernels.h"
 
 namespace lobe {
 
@@ -17,18 +17,18 @@ namespace lobe {
 inline constexpr float kMinMass = 1e-30f;
 
 /// A point of component k of the mixture, from u uniform in [0,1)².
-Vec2 sampleLane(const LanesView& mixture, int k, const Vec2& u);
+Vec2 sampleLane(const GaussiansView& mixture, int k, const Vec2& u);
 
 /// Chooses a component in proportion to its weight with `choice` uniform in [0,1), then samples it. The weights have a
 /// positive sum.
-Vec2 sampleLanes(const LanesView& mixture, float choice, const Vec2& u);
+Vec2 sampleGaussians(const GaussiansView& mixture, float choice, const Vec2& u);
 
 /// The product density of one pair of factors. Views the factors; they outlive it. No allocation.
 class Product {
  public:
-  /// Factors as lane_kernels.h wants them, of at most kMaxReflectanceComponents and kMaxLightComponents components.
+  /// Factors as kernels.h wants them, of at most kMaxReflectanceComponents and kMaxLightComponents components.
   /// constant ≥ 0 is the height of a flat term added to the reflectance.
-  Product(const LanesView& reflectance, float constant, const LanesView& light);
+  Product(const GaussiansView& reflectance, float constant, const GaussiansView& light);
 
   /// Z; 0 when it is below kMinMass or not finite: then there is no product, and neither sample nor pdf may be called.
   float mass() const { return mass_; }
@@ -40,7 +40,7 @@ class Product {
   float pdf(const Vec2& y) const;
 
  private:
-  LanesView reflectance_, light_;
+  GaussiansView reflectance_, light_;
   float constant_;
   float mass_ = 0;
   std::array<float, kMaxLightComponents> columns_;  // running sums over the light's components

@@ -6,10 +6,10 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "runtime/core/random.h"
 #include "runtime/mixture/eigenvalue_floor.h"
 #include "runtime/mixture/em.h"
 #include "runtime/mixture/fast_exp.h"
-#include "runtime/mixture/random.h"
 
 namespace lobe {
 
@@ -46,13 +46,13 @@ float backgroundPdf(const Vec2& y) {
 }
 
 // The first index at which the running sum of the shares exceeds `target`; the last with a share if rounding hides it.
-std::size_t choose(std::span<const double> shares, double target) {
+std::size_t choose(std::span<const double> fractions, double target) {
   std::size_t last = 0;
-  for (std::size_t i = 0; i < shares.size(); ++i) {
-    if (!(shares[i] > 0)) continue;
+  for (std::size_t i = 0; i < fractions.size(); ++i) {
+    if (!(fractions[i] > 0)) continue;
     last = i;
-    if (target < shares[i]) break;
-    target -= shares[i];
+    if (target < fractions[i]) break;
+    target -= fractions[i];
   }
   return last;
 }
@@ -89,7 +89,6 @@ class StepwiseEm::Sweep {
   std::array<float, lanes> y_{}, slope_{}, along_{}, across_{}, scale_{};
   std::array<double, lanes> g_{}, sx_{}, sy_{}, cxx_{}, cxy_{}, cyy_{};
   std::array<Gaussian, lanes> gaussians_{};
-  const StepwiseEmOptions& options_;
   double totalWeight_, backgroundWeight_;
   int count_;
   float background_;
@@ -97,8 +96,7 @@ class StepwiseEm::Sweep {
 
 template <int lanes>
 StepwiseEm::Sweep<lanes>::Sweep(const StepwiseEm& em)
-    : options_(em.options_),
-      totalWeight_(em.totalWeight_),
+    : totalWeight_(em.totalWeight_),
       backgroundWeight_(em.backgroundWeight_),
       count_(static_cast<int>(em.gaussians_.size())),
       background_(em.background_) {
@@ -169,18 +167,18 @@ float StepwiseEm::Sweep<lanes>::add(const WeightedPoint& point, double step) {
 template <int lanes>
 Covariance StepwiseEm::Sweep<lanes>::covariance(int k, double n) const {
   const double mx = sx_[k] / g_[k], my = sy_[k] / g_[k], perWeight = n / totalWeight_;
-  const double inverse = 1 / (options_.priorA + g_[k] * perWeight);
-  return withEigenvalueFloor(
-      (options_.priorB + (cxx_[k] - mx * sx_[k]) * perWeight) * inverse, (cxy_[k] - mx * sy_[k]) * perWeight * inverse,
-      (options_.priorB + (cyy_[k] - my * sy_[k]) * perWeight) * inverse, std::sqrt(options_.minDeterminant));
+  const double inverse = 1 / (kPriorA + g_[k] * perWeight);
+  return withEigenvalueFloor((kPriorB + (cxx_[k] - mx * sx_[k]) * perWeight) * inverse,
+                             (cxy_[k] - mx * sy_[k]) * perWeight * inverse,
+                             (kPriorB + (cyy_[k] - my * sy_[k]) * perWeight) * inverse, std::sqrt(kMinDeterminant));
 }
 
 template <int lanes>
 void StepwiseEm::Sweep<lanes>::maximise(double n) {
   // The mode under a Dirichlet prior over all K + 1 weights; Gaussians' weights are then relative to their sum.
-  const double pseudo = options_.priorV, perWeight = n / totalWeight_;
-  const double all = n + count_ * pseudo + options_.backgroundPrior;
-  background_ = static_cast<float>((backgroundWeight_ * perWeight + options_.backgroundPrior) / all);
+  const double pseudo = kPriorV, perWeight = n / totalWeight_;
+  const double all = n + count_ * pseudo + kBackgroundPrior;
+  background_ = static_cast<float>((backgroundWeight_ * perWeight + kBackgroundPrior) / all);
   double gaussianWeight = 0;
   for (int k = 0; k < count_; ++k) gaussianWeight += g_[k] * perWeight + pseudo;
   for (int k = 0; k < count_; ++k) {
@@ -193,11 +191,10 @@ void StepwiseEm::Sweep<lanes>::maximise(double n) {
   prepare();
 }
 
-StepwiseEm::StepwiseEm(int components, const StepwiseEmOptions& options)
-    : options_(options), background_(options.initialBackground) {
+StepwiseEm::StepwiseEm(int components) : background_(kInitialBackground) {
   if (components < 1 || components > kMaxIlluminationComponents)
     throw std::runtime_error("the number of components of an illumination mixture must be between 1 and 16");
-  const Covariance wide{options.initialVariance, 0.0f, options.initialVariance};
+  const Covariance wide{kInitialVariance, 0.0f, kInitialVariance};
   // On a spiral that covers the disc evenly.
   constexpr float kGoldenAngle = 2.39996323f;
   const auto count = static_cast<float>(components);
@@ -236,12 +233,12 @@ void StepwiseEm::spread(std::span<const WeightedPoint> points) {
 void StepwiseEm::fit(std::span<const WeightedPoint> points) {
   const Evidence evidence = evidenceOf(points);
   if (evidence.points == 0) return;
-  *this = StepwiseEm(static_cast<int>(gaussians_.size()), options_);
+  *this = StepwiseEm(static_cast<int>(gaussians_.size()));
   spread(points);
   double previous = -std::numeric_limits<double>::infinity();
-  for (int i = 0; i < options_.maxSweeps; ++i) {
+  for (int i = 0; i < kMaxSweeps; ++i) {
     const double likelihood = sweep(points, i == 0 ? 0.0 : evidence.effective, evidence.effective);
-    if (std::abs(likelihood - previous) <= options_.tolerance) break;
+    if (std::abs(likelihood - previous) <= kTolerance) break;
     previous = likelihood;
   }
   samples_ = evidence.points;
@@ -267,11 +264,11 @@ double StepwiseEm::sweep(std::span<const WeightedPoint> points, double evidenceB
     for (std::size_t i = 0, at = 0; i < points.size(); ++i, at = (at + stride) % points.size()) {
       const WeightedPoint& p = points[at];
       if (!counts(p)) continue;
-      const float density = state.add(p, std::pow(static_cast<float>(samples_ + 1), -options_.stepExponent));
+      const float density = state.add(p, std::pow(static_cast<float>(samples_ + 1), -kStepExponent));
       ++samples_;
       likelihood += p.weight * std::log(std::max(density, std::numeric_limits<float>::min()));
       weight += p.weight;
-      if (++waiting < options_.samplesPerUpdate) continue;
+      if (++waiting < kSamplesPerUpdate) continue;
       state.maximise(evidence(i + 1));
       waiting = 0;
     }

@@ -14,10 +14,10 @@ namespace lobe {
 struct FieldOptions {
   static constexpr int kMostComponents = 8;
 
-  float sceneDiagonal = 1;  ///< of the scene's bounding box, world units, > 0
-  int components = 8;       ///< Gaussians of a record, 1 to kMostComponents
-  int neighbours = 250;     ///< particles that a record is updated from in a pass, at most
-  float unitShare = 0.02f;  ///< largest radius of a record, as a fraction of the diagonal, in (0, 1]
+  float sceneDiagonal = 1;     ///< of the scene's bounding box, world units, > 0
+  int components = 8;          ///< Gaussians of a record, 1 to kMostComponents
+  int neighbours = 250;        ///< particles that a record is updated from in a pass, at most
+  float unitFraction = 0.02f;  ///< largest radius of a record, as a fraction of the diagonal, in (0, 1]
   float klThreshold =
       5.0f;  ///< standard deviations by which parallax may move a component within a record's radius, > 0
 
@@ -71,8 +71,8 @@ class Field {
 
   std::size_t records() const;
   std::size_t bytes() const;
-  double meanComponents() const;     ///< of a record; 0 without records
-  double undersampledShare() const;  ///< of the records: those that have seen fewer than five particles a component
+  double meanComponents() const;        ///< of a record; 0 without records
+  double undersampledFraction() const;  ///< of the records: those that have seen fewer than five particles a component
 
  private:
   friend class SurfaceDistribution;

@@ -56,7 +56,7 @@ class PathRecorder {
  private:
   struct Fraction {
     std::size_t record;
-    float bsdfPdf, mixturePdf, covered, weight;
+    float bsdfPdf, mixturePdf, representable, weight;
   };
   struct Vertex {
     Float3 position, normal, direction;

@@ -42,8 +42,8 @@ struct TintedLobe {
 /// The smooth (not delta) part of the BSDF at this point and wo, as far as mixtures describe it.
 struct SurfaceReflectance {
   std::span<const TintedLobe> lobes;
-  float diffuseAlbedo = 0;     ///< of constant reflection, luminance
-  float undescribedShare = 0;  ///< fraction in [0,1] of the albedo that neither describes: transmission, other lobes
+  float diffuseAlbedo = 0;        ///< of constant reflection, luminance
+  float undescribedFraction = 0;  ///< fraction in [0,1] of the albedo that neither describes: transmission, other lobes
 };
 
 /// What was made of a point.
@@ -51,8 +51,8 @@ enum class GuidingDecision : std::uint8_t {
   product,       ///< illumination times reflectance
   illumination,  ///< the illumination mixture, because reflectance is constant or no caches were given
   undersampled,  ///< illumination and BSDF half and half: the record has seen few particles
-  narrow,        ///< BSDF only: its lobes are too narrow for mixtures, or nothing is described
-  even,          ///< BSDF only: the illumination is uniform
+  tooNarrow,     ///< BSDF only: its lobes are too narrow for mixtures, or nothing is described
+  uniform,       ///< BSDF only: the illumination is uniform
   noRecord       ///< BSDF only: nothing was learnt here
 };
 
@@ -62,14 +62,32 @@ inline constexpr float kInitialBsdfFraction = 0.20f;
 /// What found a direction.
 enum class Strategy : std::uint8_t { bsdf, product, illumination };
 
+namespace detail {
+
+/// Splits [0,1) at a probability and maps the part that choice falls in to [0,1).
+inline bool takePart(float& choice, float probability) {
+  constexpr float kOneMinusEpsilon = 0x1.fffffep-1f;
+  const bool first = choice < probability;
+  const float mapped = first ? choice / probability : probability < 1 ? (choice - probability) / (1 - probability) : 0;
+  choice = mapped < kOneMinusEpsilon ? mapped : kOneMinusEpsilon;
+  return first;
+}
+
+inline Strategy chooseStrategy(float& choice, float bsdfProbability, float productOfGuided) {
+  if (takePart(choice, bsdfProbability)) return Strategy::bsdf;
+  return takePart(choice, productOfGuided) ? Strategy::product : Strategy::illumination;
+}
+
+}  // namespace detail
+
 /// A direction that was not drawn by the BSDF.
 struct GuidedSample {
   Float3 wi;        ///< unit, local
   float guidedPdf;  ///< SurfaceDistribution::guidedPdf(wi)
 };
 
-/// Holds no memory of its own besides itself (some kilobytes: keep it on the stack). Field and caches outlive it, and
-/// the field must not be updated while it lives. One thread at a time.
+/// Some kilobytes without memory on the heap: keep it on the stack. It copies what it needs of the field, so that later
+/// updates of the field do not affect it; the cache set outlives it. One thread at a time.
 class SurfaceDistribution {
  public:
   /// Looks up the record that serves the point. Without one all directions are the BSDF's.
@@ -77,19 +95,19 @@ class SurfaceDistribution {
   SurfaceDistribution(const SurfaceDistribution&) = delete;
   SurfaceDistribution& operator=(const SurfaceDistribution&) = delete;
 
-  bool hasRecord() const;
+  bool hasRecord() const { return hasRecord_; }
 
   /// To be called once if hasRecord(). caches: as opened for the lobes' indices; nullptr: no product is made (Vorba et
   /// al. 2014).
   void describe(const SurfaceReflectance& reflectance, const LobeCacheSet* caches);
 
-  GuidingDecision decision() const;
+  GuidingDecision decision() const { return decision_; }
 
   /// The probability with which the BSDF's own sampler is to be used; positive, 1 without a record.
-  float bsdfProbability() const;
+  float bsdfProbability() const { return bsdfProbability_; }
 
   /// Chooses with `choice` uniform in [0,1), which is made uniform again for what is chosen.
-  Strategy choose(float& choice) const;
+  Strategy choose(float& choice) const { return detail::chooseStrategy(choice, bsdfProbability_, productOfGuided_); }
 
   /// A direction by a strategy other than the BSDF; choice and u uniform in [0,1) and [0,1)². nullopt: a sample
   /// of value zero.
@@ -109,9 +127,14 @@ class SurfaceDistribution {
  private:
   friend class PathRecorder;
   struct Impl;
-  static constexpr std::size_t kBytes = 3584, kAlignment = 32;
+  static constexpr std::size_t kBytes = 3968, kAlignment = 32;
+
   Impl& impl();
   const Impl& impl() const;
+  bool hasRecord_ = false;
+  GuidingDecision decision_ = GuidingDecision::noRecord;
+  float bsdfProbability_ = 1;
+  float productOfGuided_ = 0;  // the probability of Strategy::product where it is not the BSDF's
   alignas(kAlignment) std::byte storage_[kBytes];
 };
 

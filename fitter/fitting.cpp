@@ -1,0 +1,83 @@
+#include "lobe/fitting.h"
+
+#include <algorithm>
+#include <cctype>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "fitter/compile.h"
+
+namespace lobe {
+namespace {
+
+Float3 floats(const Vec3& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+/// A host's functions behind the interface that the fit knows.
+class HostLobe : public Lobe {
+ public:
+  explicit HostLobe(const LobeFunctions& functions) : functions_(functions) {}
+
+  LobeKind kind() const override { return functions_.anisotropic ? LobeKind::anisotropic : LobeKind::isotropic; }
+  std::string model() const override { return functions_.model; }
+  std::string key() const override { return functions_.key; }
+  std::string summary() const override { return functions_.key; }
+  int revision() const override { return functions_.revision; }
+  bool mirrorSymmetric() const override { return functions_.mirrorSymmetric; }
+
+  double eval(const Vec3& wo, const Vec3& wi) const override {
+    return wo.z() > 0 && wi.z() > 0 ? functions_.evaluate(floats(wo), floats(wi)) : 0.0;
+  }
+  std::optional<LobeSample> sample(const Vec3& wo, const Vec2& u) const override {
+    const std::optional<LobeDirection> drawn = functions_.sample(floats(wo), {u.x(), u.y()});
+    if (!drawn || !(drawn->wi.z > 0)) return std::nullopt;
+    return LobeSample{{drawn->wi.x, drawn->wi.y, drawn->wi.z}, drawn->pdf};
+  }
+  float pdf(const Vec3& wo, const Vec3& wi) const override { return functions_.pdf(floats(wo), floats(wi)); }
+
+ private:
+  LobeFunctions functions_;
+};
+
+void validate(const LobeFunctions& lobe) {
+  const bool named = !lobe.model.empty() && std::ranges::all_of(lobe.model, [](unsigned char c) {
+    return std::isalnum(c) || c == '-' || c == '_';
+  });
+  if (!named)
+    throw std::runtime_error(
+        fmt::format("LobeFunctions::model '{}' must be a name of letters, digits, '-' and '_'", lobe.model));
+  if (lobe.key.empty()) throw std::runtime_error("LobeFunctions::key must not be empty");
+  if (!lobe.evaluate || !lobe.sample || !lobe.pdf)
+    throw std::runtime_error("LobeFunctions: evaluate, sample and pdf must all be given");
+}
+
+}  // namespace
+
+void FittingOptions::validate() const {
+  const auto require = [](bool condition, const char* field, const char* range) {
+    if (!condition) throw std::runtime_error(fmt::format("FittingOptions::{} must be {}", field, range));
+  };
+  require(!folder.empty(), "folder", "the name of a folder");
+  require(quality > 0 && std::isfinite(quality), "quality", "positive");
+  require(components >= 1 && components <= static_cast<int>(kMaxCacheComponents), "components", "from 1 to 32");
+}
+
+CompiledLobe compileLobe(const LobeFunctions& lobe, const FittingOptions& options) {
+  validate(lobe);
+  options.validate();
+  CompileOptions compile;
+  compile.directory = options.folder;
+  compile.force = options.force;
+  compile.settings.quality = options.quality;
+  compile.settings.components = static_cast<std::uint32_t>(options.components);
+  const CompileJob job = planCompile({{std::make_shared<HostLobe>(lobe), {}}}, compile).front();
+  if (!job.upToDate) runCompile(job, {});
+  const LobeCache cache = LobeCache::open(job.path);
+  float worst = 0;
+  for (const CacheRecord& r : cache.records()) worst = std::max({worst, r.nev, r.nevCoverage});
+  return {job.path, !job.upToDate, cache.records().size(), worst};
+}
+
+}  // namespace lobe

@@ -1,0 +1,91 @@
+#include "runtime/analysis/disc_panel.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Dense>
+
+namespace lobe {
+namespace {
+
+constexpr int kRing = 6;  // pixels
+constexpr Colour kBeyond{0.85f, 0.85f, 0.85f}, kEllipse{1, 0.25f, 0.2f};
+
+/// How much of a pixel a line of the given width covers, `distance` pixels off.
+double coverage(double distance, double width) {
+  return std::clamp(0.5 * width + 0.5 - std::abs(distance), 0.0, 1.0);
+}
+
+/// In pixels from the corner, moved inside to where a ring is whole when it is out of view.
+Vec2 pixelInView(const Panel& panel, const Vec2& y) {
+  const Vec2 d = (y - panel.view.centre) / panel.step();
+  const float middle = 0.5f * kPanel, limit = d.cwiseAbs().maxCoeff() > middle ? middle - kRing - 3 : middle;
+  return {middle + std::clamp(d.x(), -limit, limit), middle - std::clamp(d.y(), -limit, limit)};
+}
+
+/// Distances from the ellipse to first order: Mahalanobis distance over the length of its gradient.
+void drawEllipse(Raster& raster, const Panel& panel, const Gaussian& g, double opacity) {
+  const Eigen::Matrix2f cov{{g.cov.xx, g.cov.xy}, {g.cov.xy, g.cov.yy}};
+  const Eigen::Matrix2d inverse = cov.cast<double>().inverse();
+  forEachPixel([&](int x, int y) {
+    const Eigen::Vector2d d = (panel.point(x, y) - g.mean()).cast<double>(), v = inverse * d;
+    const double m = std::sqrt(std::max(0.0, d.dot(v)));
+    if (!(m > 0)) return;
+    const double distance = (m - 1) * m / v.norm() / panel.step();
+    raster.blend(panel.left + x, panel.top + y, kEllipse, opacity * coverage(distance, 1.5));
+  });
+}
+
+}  // namespace
+
+Vec2 Panel::point(int x, int y) const {
+  const Vec2 fromCorner(static_cast<float>(x) + 0.5f, -static_cast<float>(y) - 0.5f);
+  return view.centre + Vec2(-view.half, view.half) + step() * fromCorner;
+}
+
+void forEachPixel(const std::function<void(int, int)>& visit) {
+  for (int y = 0; y < kPanel; ++y)
+    for (int x = 0; x < kPanel; ++x) visit(x, y);
+}
+
+double largest(const Panel& panel, const DiscFunction& density) {
+  double peak = 0;
+  forEachPixel([&](int x, int y) {
+    const Vec2 point = panel.point(x, y);
+    if (insideDisc(point)) peak = std::max(peak, density(point));
+  });
+  return peak;
+}
+
+void drawField(Raster& raster, const Panel& panel, const std::function<Colour(const Vec2&)>& colourOf) {
+  forEachPixel([&](int x, int y) {
+    const Vec2 point = panel.point(x, y);
+    raster.set(panel.left + x, panel.top + y, insideDisc(point) ? colourOf(point) : kBeyond);
+    const double edge = coverage((point.norm() - 1) / panel.step(), 1);
+    raster.blend(panel.left + x, panel.top + y, kInk, edge);
+  });
+}
+
+void drawDensity(Raster& raster, const Panel& panel, const DiscFunction& density, double peak, double decades) {
+  drawField(raster, panel, [&](const Vec2& y) {
+    const double value = density(y);
+    return sequentialColour(value > 0 && peak > 0 ? 1 + std::log10(value / peak) / decades : 0);
+  });
+}
+
+void drawEllipses(Raster& raster, const Panel& panel, std::span<const Gaussian> mixture) {
+  if (mixture.empty()) return;
+  const float heaviest = std::ranges::max(mixture, {}, &Gaussian::weight).weight;
+  for (const Gaussian& g : mixture) drawEllipse(raster, panel, g, 0.3 + 0.7 * std::sqrt(g.weight / heaviest));
+}
+
+void drawRing(Raster& raster, const Panel& panel, const Vec2& where) {
+  const Vec2 centre = pixelInView(panel, where);
+  forEachPixel([&](int x, int y) {
+    const double r = (Vec2(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f) - centre).norm();
+    raster.blend(panel.left + x, panel.top + y, kPaper, coverage(r - kRing, 5));
+    raster.blend(panel.left + x, panel.top + y, kInk, coverage(r - kRing, 2));
+  });
+}
+
+}  // namespace lobe

@@ -1,0 +1,74 @@
+#pragma once
+// Discrete and piecewise-constant distributions in one and two dimensions.
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/core/sampling.h"
+
+namespace lobe {
+
+/// Indices in proportion to non-negative weights.
+class DiscreteDistribution {
+ public:
+  DiscreteDistribution() = default;
+  explicit DiscreteDistribution(std::span<const float> weights)
+      : DiscreteDistribution(std::vector<double>(weights.begin(), weights.end())) {}
+  explicit DiscreteDistribution(const std::vector<double>& weights)
+      : cumulative_(weights.size()), guide_(weights.size()) {
+    for (std::size_t i = 0; i < weights.size(); ++i) cumulative_[i] = total_ += weights[i];
+    std::size_t i = 0;
+    for (std::size_t k = 0; k < guide_.size(); ++k) {
+      while (i + 1 < size() && cumulative_[i] <= total_ * static_cast<double>(k) / static_cast<double>(size())) ++i;
+      guide_[k] = static_cast<std::uint32_t>(i);
+    }
+  }
+
+  std::size_t size() const { return cumulative_.size(); }
+  /// Sum of the weights. 0: nothing may be sampled.
+  double total() const { return total_; }
+  double weight(std::size_t i) const { return cumulative_[i] - (i > 0 ? cumulative_[i - 1] : 0.0); }
+  float probability(std::size_t i) const { return static_cast<float>(weight(i) / total_); }
+
+  /// An index for u uniform in [0,1), which is made uniform again. Not for a total of 0.
+  std::size_t sample(float& u) const {
+    const double target = u * total_;
+    std::size_t i = guide_[std::min(static_cast<std::size_t>(u * static_cast<double>(size())), size() - 1)];
+    while (i + 1 < size() && cumulative_[i] <= target) ++i;
+    return finish(i, size(), target, u);
+  }
+
+  /// Only indices in [first, last), of which the weights have a positive sum; probabilities are relative to mass(first,
+  /// last).
+  std::size_t sample(float& u, std::size_t first, std::size_t last) const {
+    if (first == 0 && last == size()) return sample(u);
+    const double low = first > 0 ? cumulative_[first - 1] : 0.0;
+    const double target = low + u * (cumulative_[last - 1] - low);
+    const auto begin = cumulative_.begin();
+    const auto found = std::upper_bound(begin + first, begin + last, target);
+    return finish(static_cast<std::size_t>(found - begin), last, target, u);
+  }
+
+  double mass(std::size_t first, std::size_t last) const {
+    return last > first ? cumulative_[last - 1] - (first > 0 ? cumulative_[first - 1] : 0.0) : 0.0;
+  }
+
+ private:
+  // What is left of u within the index found. Rounding may have pushed the target onto the end: the last index that has
+  // a weight is meant then.
+  std::size_t finish(std::size_t i, std::size_t last, double target, float& u) const {
+    i = std::min(i, last - 1);
+    while (i > 0 && !(cumulative_[i] > cumulative_[i - 1])) --i;
+    const double below = i > 0 ? cumulative_[i - 1] : 0.0;
+    u = std::clamp(static_cast<float>((target - below) / (cumulative_[i] - below)), 0.0f, kOneMinusEpsilon);
+    return i;
+  }
+
+  std::vector<double> cumulative_;
+  std::vector<std::uint32_t> guide_;  // for each of size() equal parts of [0, total), where to start looking
+  double total_ = 0;
+};
+
+}  // namespace lobe

@@ -1,0 +1,39 @@
+#pragma once
+// Reading whole files, and hashing their content.
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <new>
+#include <span>
+#include <stdexcept>
+#include <string>
+
+#include <fmt/format.h>
+
+namespace lobe {
+
+/// Opens a regular file for reading bytes. Throws std::runtime_error with the reason but without the file's name, which
+/// nameErrors adds.
+std::ifstream openFile(const std::filesystem::path& path);
+
+/// The content of a regular file. Throws as openFile.
+std::string readFile(const std::filesystem::path& path);
+
+/// Returns what read() returns. Exceptions become std::runtime_error whose message begins with the file's name.
+template <class Read>
+auto nameErrors(const std::filesystem::path& path, Read&& read) {
+  try {
+    return read();
+  } catch (const std::bad_alloc&) {
+    throw std::runtime_error(fmt::format("{}: not enough memory to read it", path.string()));
+  } catch (const std::exception& e) {
+    throw std::runtime_error(fmt::format("{}: {}", path.string(), e.what()));
+  }
+}
+
+/// XXH3-64 of the bytes.
+std::uint64_t contentHash(std::string_view bytes);
+
+}  // namespace lobe

@@ -1,0 +1,25 @@
+#pragma once
+// Order statistics of small samples.
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+namespace lobe {
+
+/// The q-quantile, q in [0, 1], interpolated linearly between the two nearest values. NaN without values.
+inline double quantile(std::vector<double> values, double q) {
+  if (values.empty()) return NAN;
+  std::ranges::sort(values);
+  const double position = q * static_cast<double>(values.size() - 1);
+  const auto below = static_cast<std::size_t>(position);
+  const std::size_t above = std::min(below + 1, values.size() - 1);
+  return values[below] + (position - static_cast<double>(below)) * (values[above] - values[below]);
+}
+
+inline double median(std::vector<double> values) {
+  return quantile(std::move(values), 0.5);
+}
+
+}  // namespace lobe

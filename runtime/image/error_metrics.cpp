@@ -1,0 +1,84 @@
+#include "runtime/image/error_metrics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+namespace lobe {
+namespace {
+
+void checkSizes(const Image& reference, const Image& image) {
+  if (reference.width != image.width || reference.height != image.height)
+    throw std::runtime_error(fmt::format("the image has {}x{} pixels, the reference {}x{}", image.width, image.height,
+                                         reference.width, reference.height));
+  if (reference.pixels.empty()) throw std::runtime_error("the images have no pixels");
+}
+
+float relativeError(const Rgb& reference, const Rgb& value) {
+  if (!reference.allFinite() || !value.allFinite()) return std::numeric_limits<float>::quiet_NaN();
+  double sum = 0;
+  for (int c = 0; c < 3; ++c) {
+    const double r = reference[c];
+    const double difference = value[c] - r;
+    sum += difference * difference / (r * r + 0.01);
+  }
+  return static_cast<float>(sum / 3.0);
+}
+
+// Of sorted values, without the largest `share`.
+double trimmedMean(const std::vector<float>& sorted, double fraction) {
+  const std::size_t kept = sorted.size() - static_cast<std::size_t>(fraction * static_cast<double>(sorted.size()));
+  double sum = 0;
+  for (std::size_t i = 0; i < kept; ++i) sum += sorted[i];
+  return kept > 0 ? sum / static_cast<double>(kept) : 0.0;
+}
+
+double squaredDistance(const Rgb& a, const Rgb& b) {
+  return (a.cast<double>() - b.cast<double>()).square().sum();
+}
+
+}  // namespace
+
+Image averagedDown(const Image& image, int factor) {
+  if (factor < 1 || image.width % factor != 0 || image.height % factor != 0)
+    throw std::runtime_error(
+        fmt::format("{}x{} pixels are not squares of {} a side", image.width, image.height, factor));
+  Image result(image.width / factor, image.height / factor);
+  const float fraction = 1.0f / static_cast<float>(factor * factor);
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) result.at(x / factor, y / factor) += fraction * image.at(x, y);
+  return result;
+}
+
+std::vector<float> relativeErrors(const Image& reference, const Image& image) {
+  checkSizes(reference, image);
+  std::vector<float> errors(image.pixels.size());
+  for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = relativeError(reference.pixels[i], image.pixels[i]);
+  return errors;
+}
+
+ErrorMetrics compareImages(const Image& reference, const Image& image) {
+  std::vector<float> errors = relativeErrors(reference, image);
+  ErrorMetrics metrics;
+  double squares = 0, sumImage = 0, sumReference = 0;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    if (std::isnan(errors[i])) continue;
+    squares += squaredDistance(image.pixels[i], reference.pixels[i]);
+    sumImage += image.pixels[i].cast<double>().sum();
+    sumReference += reference.pixels[i].cast<double>().sum();
+  }
+  std::erase_if(errors, [](float e) { return std::isnan(e); });
+  std::sort(errors.begin(), errors.end());
+  metrics.nonfinite = image.pixels.size() - errors.size();
+  metrics.mse = errors.empty() ? 0.0 : squares / (3.0 * static_cast<double>(errors.size()));
+  metrics.relmse = trimmedMean(errors, 0.0);
+  metrics.relmseDrop01 = trimmedMean(errors, 0.001);
+  metrics.relmseDrop1 = trimmedMean(errors, 0.01);
+  metrics.meanRatio = sumReference == 0.0 ? std::numeric_limits<double>::quiet_NaN() : sumImage / sumReference;
+  return metrics;
+}
+
+}  // namespace lobe

@@ -1,0 +1,328 @@
+#include "runtime/image/image.h"
+
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfInputFile.h>
+#include <ImfTestFile.h>
+#include <ImfVersion.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "runtime/core/colour.h"
+#include "runtime/core/files.h"
+#include "runtime/core/fingerprint.h"
+#include "runtime/image/jpeg_file.h"
+#include "runtime/image/rgbe_file.h"
+
+// Private to this file, so that another copy elsewhere does not clash.
+#define STB_IMAGE_IMPLEMENTATION
+#define STB_IMAGE_STATIC
+#define STBI_NO_GIF
+#define STBI_NO_HDR
+#define STBI_NO_JPEG
+#define STBI_NO_LINEAR
+#define STBI_NO_PIC
+#define STBI_NO_PNM
+#define STBI_NO_PSD
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-function"
+#include <stb/stb_image.h>
+#pragma GCC diagnostic pop
+
+namespace lobe {
+namespace {
+
+/// A damaged header must not make us ask for all memory there is.
+constexpr std::int64_t kMaxPixels = std::int64_t{1} << 27;
+
+[[noreturn]] void fail(const std::filesystem::path& path, const std::string& fault) {
+  throw std::runtime_error(fmt::format("{}: {}", path.string(), fault));
+}
+
+void checkSize(const std::filesystem::path& path, std::int64_t width, std::int64_t height) {
+  if (width <= 0 || height <= 0 || width > kMaxPixels / height)
+    fail(path, fmt::format("its size of {}x{} pixels is beyond what is read", width, height));
+}
+
+/// Nor must a file of some kilobytes, of which even a uniform picture takes more than this where it is large.
+void checkExpansion(const std::filesystem::path& path, std::int64_t width, std::int64_t height, std::size_t bytes) {
+  constexpr std::int64_t kLarge = std::int64_t{1} << 24, kMostPerByte = 2000;
+  checkSize(path, width, height);
+  if (width * height > kLarge && width * height / kMostPerByte > static_cast<std::int64_t>(bytes))
+    fail(path, fmt::format("its {}x{} pixels are too many to be meant by a file of {} bytes", width, height, bytes));
+}
+
+float decode(float encoded, const Encoding& encoding) {
+  switch (encoding.kind) {
+    case Encoding::Kind::linear:
+      return encoded;
+    case Encoding::Kind::gamma:
+      return std::pow(encoded, encoding.exponent);
+    case Encoding::Kind::srgb:
+    case Encoding::Kind::tagged:  // without a tag
+      break;
+  }
+  return decodeSrgb(encoded);
+}
+
+// ---- EXR
+
+/// What of a file becomes the image: its colours, or its alpha channel as grey.
+enum class Part { colours, alpha };
+
+using ChannelNames = std::array<const char*, 3>;
+
+[[noreturn]] void failWithoutAlpha(const std::filesystem::path& path) {
+  fail(path, "it has no alpha channel");
+}
+
+/// The names of the channels to read as red, green and blue.
+ChannelNames exrChannels(const std::filesystem::path& path, const Imf::ChannelList& channels, Part part) {
+  if (part == Part::alpha && channels.findChannel("A")) return {"A", "A", "A"};
+  if (part == Part::alpha) failWithoutAlpha(path);
+  if (channels.findChannel("R") && channels.findChannel("G") && channels.findChannel("B")) return {"R", "G", "B"};
+  const bool chroma = channels.findChannel("RY") || channels.findChannel("BY");
+  if (channels.findChannel("Y") && !chroma) return {"Y", "Y", "Y"};
+  std::string names;
+  for (auto it = channels.begin(); it != channels.end(); ++it) names += fmt::format(" {}", it.name());
+  fail(path, fmt::format("needs channels R, G and B or Y alone, but has{}", names.empty() ? " none" : names));
+}
+
+struct Area {
+  explicit Area(const Imath::Box2i& window)
+      : left(window.min.x),
+        top(window.min.y),
+        width(std::int64_t{window.max.x} - window.min.x + 1),
+        height(std::int64_t{window.max.y} - window.min.y + 1) {}
+  bool operator==(const Area&) const = default;
+  std::int64_t left, top, width, height;
+};
+
+/// What of the data window lies in the display window, black around it.
+Image placeOnDisplay(const Image& data, const Area& dataWindow, const Area& display) {
+  Image image(static_cast<int>(display.width), static_cast<int>(display.height));
+  const std::int64_t dx = display.left - dataWindow.left, dy = display.top - dataWindow.top;
+  const std::int64_t first = std::max<std::int64_t>(0, -dx), last = std::min(display.width, dataWindow.width - dx);
+  if (first >= last) return image;
+  for (std::int64_t y = std::max<std::int64_t>(0, -dy); y < std::min(display.height, dataWindow.height - dy); ++y)
+    std::copy_n(&data.pixels[(y + dy) * data.width + first + dx], last - first, &image.pixels[y * image.width + first]);
+  return image;
+}
+
+/// The data window of the file, whichever of its channels are asked for.
+Image readDataWindow(const std::filesystem::path& path, Imf::InputFile& file, const Area& area, Part part) {
+  const ChannelNames names = exrChannels(path, file.header().channels(), part);
+  const int distinct = names[0] == names[1] ? 1 : 3;
+  Image image(static_cast<int>(area.width), static_cast<int>(area.height));
+  // OpenEXR addresses pixels by their place in the data window, hence the shifted origin.
+  constexpr std::int64_t kStride = sizeof(Rgb);
+  char* origin = reinterpret_cast<char*>(image.pixels.data()) - kStride * (area.left + area.top * area.width);
+  Imf::FrameBuffer frame;
+  for (int c = 0; c < distinct; ++c) {
+    const Imf::Channel& channel = file.header().channels()[names[c]];
+    if (channel.xSampling != 1 || channel.ySampling != 1) fail(path, "subsampled channels are not read");
+    frame.insert(names[c], Imf::Slice(Imf::FLOAT, origin + c * sizeof(float), kStride, kStride * area.width));
+  }
+  file.setFrameBuffer(frame);
+  const Imath::Box2i window = file.header().dataWindow();
+  file.readPixels(window.min.y, window.max.y);
+  if (distinct == 1)
+    for (Rgb& pixel : image.pixels) pixel = Rgb::Constant(pixel.x());
+  return image;
+}
+
+Image readExrPixels(const std::filesystem::path& path, Part part) {
+  Imf::InputFile file(path.c_str());
+  const Area data(file.header().dataWindow()), display(file.header().displayWindow());
+  checkSize(path, data.width, data.height);
+  checkSize(path, display.width, display.height);
+  Image image = readDataWindow(path, file, data, part);
+  return data == display ? image : placeOnDisplay(image, data, display);
+}
+
+Image readExr(const std::filesystem::path& path, Part part) {
+  try {
+    return readExrPixels(path, part);
+  } catch (const std::bad_alloc&) {
+    fail(path, "too large for the memory there is");
+  } catch (const Iex::BaseExc& e) {
+    fail(path, fmt::format("damaged EXR file ({})", e.what()));
+  }
+}
+
+// ---- everything else
+
+struct FreePixels {
+  void operator()(void* pixels) const { stbi_image_free(pixels); }
+};
+template <class T>
+using Pixels = std::unique_ptr<T, FreePixels>;
+
+/// The file as stb_image takes it, to find out whether it asks for more than there is: JPEG and TGA files cut short
+/// would pass for whole ones.
+struct Source {
+  std::string_view rest;
+  bool exhausted = false;
+
+  static int read(void* user, char* out, int size) {
+    Source& source = *static_cast<Source*>(user);
+    const std::size_t n = std::min(source.rest.size(), static_cast<std::size_t>(size));
+    std::copy_n(source.rest.data(), n, out);
+    source.rest.remove_prefix(n);
+    if (n == 0) source.exhausted = true;
+    return static_cast<int>(n);
+  }
+  static void skip(void* user, int size) {
+    Source& source = *static_cast<Source*>(user);
+    const auto n = static_cast<std::size_t>(std::max(0, size));
+    if (n > source.rest.size()) source.exhausted = true;
+    source.rest.remove_prefix(std::min(n, source.rest.size()));
+  }
+  static int eof(void* user) { return static_cast<Source*>(user)->rest.empty(); }
+};
+constexpr stbi_io_callbacks kSourceCallbacks = {Source::read, Source::skip, Source::eof};
+
+/// Red, green, blue and alpha of a pixel.
+constexpr int kComponents = 4;
+
+/// The pixels of an integer format by a table of what each code means.
+template <class T>
+Image decodeColours(const T* codes, int width, int height, const Encoding& encoding) {
+  constexpr int kLargest = std::numeric_limits<T>::max();
+  std::vector<float> linear(kLargest + 1);
+  for (int i = 0; i <= kLargest; ++i) linear[i] = decode(static_cast<float>(i) / kLargest, encoding);
+  Image image(width, height);
+  for (Rgb& pixel : image.pixels) {
+    pixel = Rgb(linear[codes[0]], linear[codes[1]], linear[codes[2]]);
+    codes += kComponents;
+  }
+  return image;
+}
+
+template <class T>
+Image decodeAlpha(const T* codes, int width, int height) {
+  Image image(width, height);
+  for (Rgb& pixel : image.pixels) {
+    pixel = grey(static_cast<float>(codes[3]) / std::numeric_limits<T>::max());
+    codes += kComponents;
+  }
+  return image;
+}
+
+/// Loads by one of stb_image's functions.
+template <class T, class Load>
+Image loadPixels(const std::filesystem::path& path, std::string_view bytes, const Encoding& encoding, Part part,
+                 Load load) {
+  Source source{bytes};
+  int width = 0, height = 0, channels = 0;
+  const Pixels<T> pixels(load(&kSourceCallbacks, &source, &width, &height, &channels, kComponents));
+  if (source.exhausted) fail(path, "damaged image (it ends too early)");
+  if (!pixels) fail(path, fmt::format("damaged image ({})", stbi_failure_reason()));
+  return part == Part::alpha ? decodeAlpha<T>(pixels.get(), width, height)
+                             : decodeColours<T>(pixels.get(), width, height, encoding);
+}
+
+Image readHdr(const std::filesystem::path& path, std::string_view bytes, Part part) {
+  if (part == Part::alpha) failWithoutAlpha(path);
+  const auto [width, height] = nameErrors(path, [&] { return sizeOfRgbe(bytes); });
+  checkExpansion(path, width, height, bytes.size());
+  return nameErrors(path, [&] { return readRgbe(bytes); });
+}
+
+std::uint32_t bigEndian(std::string_view bytes) {
+  std::uint32_t value = 0;
+  for (const char byte : bytes.substr(0, 4)) value = value << 8 | static_cast<std::uint8_t>(byte);
+  return value;
+}
+
+/// The exponent that a PNG's gAMA chunk asks for; nullopt where there is none, or an sRGB chunk, which goes before.
+std::optional<float> gammaOfPng(std::string_view bytes) {
+  constexpr std::string_view kSignature = "\x89PNG\r\n\x1a\n";
+  constexpr std::size_t kAround = 12;  // of a chunk's data: length, name and checksum
+  std::optional<float> gamma;
+  bytes.remove_prefix(bytes.starts_with(kSignature) ? kSignature.size() : bytes.size());
+  while (bytes.size() >= kAround) {
+    const std::size_t length = bigEndian(bytes);
+    const std::string_view name = bytes.substr(4, 4);
+    if (name == "IDAT" || length > bytes.size() - kAround) break;
+    if (name == "sRGB") return std::nullopt;
+    if (name == "gAMA" && length == 4)
+      if (const std::uint32_t value = bigEndian(bytes.substr(8)); value > 0) gamma = 1e5f / static_cast<float>(value);
+    bytes.remove_prefix(kAround + length);
+  }
+  return gamma;
+}
+
+/// What the file says of itself, where that is what is wanted.
+Encoding resolved(const Encoding& encoding, std::string_view bytes) {
+  if (encoding.kind != Encoding::Kind::tagged) return encoding;
+  const std::optional<float> gamma = gammaOfPng(bytes);
+  return gamma ? Encoding{Encoding::Kind::gamma, *gamma} : encoding;
+}
+
+Image readJpegImage(const std::filesystem::path& path, std::string_view bytes, const Encoding& encoding, Part part) {
+  if (part == Part::alpha) failWithoutAlpha(path);
+  const JpegSize size = nameErrors(path, [&] { return sizeOfJpeg(bytes); });
+  checkExpansion(path, size.width, size.height, bytes.size());
+  const JpegPixels pixels = nameErrors(path, [&] { return readJpeg(bytes); });
+  return decodeColours(pixels.codes.data(), pixels.width, pixels.height, encoding);
+}
+
+Image readOther(const std::filesystem::path& path, const Encoding& encoding, Part part) {
+  const std::string bytes = nameErrors(path, [&] { return readFile(path); });
+  if (bytes.size() > static_cast<std::size_t>(std::numeric_limits<int>::max())) fail(path, "too large a file");
+  if (startsLikeRgbe(bytes)) return readHdr(path, bytes, part);
+  if (startsLikeJpeg(bytes)) return readJpegImage(path, bytes, encoding, part);
+  const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
+  const int length = static_cast<int>(bytes.size());
+  int width = 0, height = 0, channels = 0;
+  if (!stbi_info_from_memory(data, length, &width, &height, &channels))
+    fail(path, fmt::format("not an image that can be read ({}); known are PNG, JPEG, BMP, TGA, HDR and EXR",
+                           stbi_failure_reason()));
+  checkExpansion(path, width, height, bytes.size());
+  if (part == Part::alpha && channels != 2 && channels != 4) failWithoutAlpha(path);
+  if (stbi_is_16_bit_from_memory(data, length))
+    return loadPixels<stbi_us>(path, bytes, resolved(encoding, bytes), part, stbi_load_16_from_callbacks);
+  return loadPixels<stbi_uc>(path, bytes, resolved(encoding, bytes), part, stbi_load_from_callbacks);
+}
+
+bool startsLikeExr(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  char magic[4] = {};
+  return file.read(magic, 4) && Imf::isImfMagic(magic);
+}
+
+Image readPart(const std::filesystem::path& path, const Encoding& encoding, Part part) {
+  if (!std::filesystem::exists(path)) fail(path, "no such file");
+  if (!std::filesystem::is_regular_file(path)) fail(path, "not a file");
+  return startsLikeExr(path) ? readExr(path, part) : readOther(path, encoding, part);
+}
+
+}  // namespace
+
+void addTo(Fingerprint& hash, const Image& image) {
+  hash.number(image.width);
+  hash.array(std::span<const Rgb>(image.pixels));
+}
+
+Image readImage(const std::filesystem::path& path, Encoding encoding) {
+  return readPart(path, encoding, Part::colours);
+}
+
+Image readAlpha(const std::filesystem::path& path) {
+  return readPart(path, {}, Part::alpha);
+}
+
+}  // namespace lobe

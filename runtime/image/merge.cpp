@@ -1,0 +1,183 @@
+#include "runtime/image/merge.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+#include <tuple>
+
+#include <fmt/format.h>
+
+namespace lobe {
+namespace {
+
+constexpr double kLargestExact = 0x1p53;
+
+/// What a picture says of itself.
+struct Part {
+  std::filesystem::path path;
+  ImageAttributes attributes;
+  double samples;
+  std::vector<SampleRange> ranges;
+};
+
+template <class Value>
+std::optional<Value> find(const ImageAttributes& attributes, const char* name) {
+  const auto found = attributes.find(name);
+  if (found == attributes.end()) return std::nullopt;
+  const Value* value = std::get_if<Value>(&found->second);
+  return value ? std::optional(*value) : std::nullopt;
+}
+
+std::optional<std::uint64_t> findCount(const ImageAttributes& attributes, const char* name) {
+  const std::optional<double> value = find<double>(attributes, name);
+  if (!value || !(*value >= 0 && *value <= kLargestExact) || std::floor(*value) != *value) return std::nullopt;
+  return static_cast<std::uint64_t>(*value);
+}
+
+std::vector<SampleRange> parseRanges(const std::string& text) {
+  std::vector<SampleRange> ranges;
+  std::istringstream all(text);
+  for (std::string entry; std::getline(all, entry, ',');) {
+    std::istringstream words(entry);
+    SampleRange range;
+    std::string rest;
+    if (!(words >> range.integrator >> range.seed >> range.first >> range.last) || words >> rest ||
+        range.first >= range.last)
+      throw std::runtime_error(fmt::format("the attribute sampleRanges is damaged at \"{}\"", entry));
+    ranges.push_back(range);
+  }
+  return ranges;
+}
+
+std::string textOf(const std::vector<SampleRange>& ranges) {
+  std::string text;
+  for (const SampleRange& r : ranges)
+    text += fmt::format("{}{} {} {} {}", text.empty() ? "" : ", ", r.integrator, r.seed, r.first, r.last);
+  return text;
+}
+
+bool sameStream(const SampleRange& a, const SampleRange& b) {
+  return a.integrator == b.integrator && a.seed == b.seed;
+}
+
+/// Sorted, those that touch made one.
+std::vector<SampleRange> joined(std::vector<SampleRange> ranges) {
+  std::ranges::sort(ranges, {}, [](const SampleRange& r) { return std::tuple(r.integrator, r.seed, r.first); });
+  std::vector<SampleRange> result;
+  for (const SampleRange& r : ranges)
+    if (!result.empty() && sameStream(result.back(), r) && result.back().last == r.first)
+      result.back().last = r.last;
+    else
+      result.push_back(r);
+  return result;
+}
+
+Part describe(const std::filesystem::path& path) {
+  if (!std::filesystem::exists(path)) throw std::runtime_error(path.string() + ": no such file");
+  Part part{path, readAttributes(path), 0, {}};
+  const std::optional<std::uint64_t> samples = findCount(part.attributes, "samples");
+  if (!samples || *samples == 0)
+    throw std::runtime_error(fmt::format(
+        "{}: does not say how many samples it has; loberender writes that into .exr pictures", path.string()));
+  part.samples = static_cast<double>(*samples);
+  try {
+    part.ranges = sampleRanges(part.attributes);
+  } catch (const std::runtime_error& e) {
+    throw std::runtime_error(fmt::format("{}: {}", path.string(), e.what()));
+  }
+  return part;
+}
+
+/// Pictures that do not say what they show are taken on trust.
+void checkSameScene(const Part& a, const Part& b) {
+  const auto one = find<std::string>(a.attributes, "sceneHash"), other = find<std::string>(b.attributes, "sceneHash");
+  if (one && other && *one != *other)
+    throw std::runtime_error(fmt::format(
+        "{} and {}: of different scenes or cameras (sceneHash {} and {}); parts of one picture have to be of one scene",
+        a.path.string(), b.path.string(), *one, *other));
+}
+
+void checkDisjoint(const Part& a, const Part& b) {
+  for (const SampleRange& r : a.ranges)
+    for (const SampleRange& s : b.ranges) {
+      const std::uint64_t first = std::max(r.first, s.first), last = std::min(r.last, s.last);
+      if (sameStream(r, s) && first < last)
+        throw std::runtime_error(fmt::format(
+            "{} and {}: both have samples {} to {} of seed {} by {}: render one with another --sample-offset or --seed",
+            a.path.string(), b.path.string(), first, last - 1, r.seed, r.integrator));
+    }
+}
+
+ImageAttributes common(const std::vector<Part>& parts) {
+  ImageAttributes result = parts.front().attributes;
+  for (const Part& part : parts)
+    std::erase_if(result, [&](const auto& entry) {
+      const auto found = part.attributes.find(entry.first);
+      return found == part.attributes.end() || found->second != entry.second;
+    });
+  return result;
+}
+
+ImageAttributes mergedAttributes(const std::vector<Part>& parts) {
+  ImageAttributes attributes = common(parts);
+  for (const char* ofOne : {"sampleOffset", "sampleRanges", "seconds"}) attributes.erase(ofOne);
+  double samples = 0;
+  std::vector<SampleRange> ranges;
+  for (const Part& part : parts) {
+    samples += part.samples;
+    ranges.insert(ranges.end(), part.ranges.begin(), part.ranges.end());
+  }
+  ranges = joined(std::move(ranges));
+  attributes["samples"] = samples;
+  const bool isOne = ranges.size() == 1 && static_cast<double>(ranges[0].last - ranges[0].first) == samples;
+  if (isOne)
+    attributes["sampleOffset"] = static_cast<double>(ranges[0].first);
+  else if (!ranges.empty())
+    attributes["sampleRanges"] = textOf(ranges);
+  return attributes;
+}
+
+Image weightedMean(const std::vector<Part>& parts) {
+  Image result;
+  std::vector<Eigen::Array3d> sum;
+  double samples = 0;
+  for (const Part& part : parts) {
+    const Image image = readImage(part.path);
+    if (sum.empty()) {
+      result = Image(image.width, image.height);
+      sum.assign(image.pixels.size(), Eigen::Array3d::Zero());
+    }
+    if (image.width != result.width || image.height != result.height)
+      throw std::runtime_error(fmt::format("{}: has {}x{} pixels, {} {}x{}", part.path.string(), image.width,
+                                           image.height, parts.front().path.string(), result.width, result.height));
+    for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += part.samples * image.pixels[i].cast<double>();
+    samples += part.samples;
+  }
+  for (std::size_t i = 0; i < sum.size(); ++i) result.pixels[i] = (sum[i] / samples).cast<float>();
+  return result;
+}
+
+}  // namespace
+
+std::vector<SampleRange> sampleRanges(const ImageAttributes& attributes) {
+  if (const auto text = find<std::string>(attributes, "sampleRanges")) return parseRanges(*text);
+  const auto integrator = find<std::string>(attributes, "integrator");
+  const auto seed = findCount(attributes, "seed"), samples = findCount(attributes, "samples");
+  if (!integrator || !seed || !samples) return {};
+  const std::uint64_t first = findCount(attributes, "sampleOffset").value_or(0);
+  return {{*integrator, *seed, first, first + *samples}};
+}
+
+MergedImage mergeImages(std::span<const std::filesystem::path> paths) {
+  std::vector<Part> parts;
+  for (const auto& path : paths) {
+    parts.push_back(describe(path));
+    checkSameScene(parts.front(), parts.back());
+    for (std::size_t i = 0; i + 1 < parts.size(); ++i) checkDisjoint(parts[i], parts.back());
+  }
+  return {weightedMean(parts), mergedAttributes(parts)};
+}
+
+}  // namespace lobe

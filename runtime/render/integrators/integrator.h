@@ -1,0 +1,50 @@
+#pragma once
+// What all integrators share: the interface, and what they count.
+
+#include <array>
+#include <cstdint>
+
+#include "lobe/surface_distribution.h"
+#include "runtime/core/random.h"
+#include "runtime/render/geometry/ray.h"
+
+namespace lobe {
+
+/// What found the next direction of a path: in the order of Strategy, then delta scattering.
+inline constexpr std::array<const char*, 4> kScatteringNames{"bsdf", "product", "illumination", "delta"};
+
+/// In the order of GuidingDecision.
+inline constexpr std::array<const char*, 6> kGuidingDecisionNames{"product",    "illumination", "undersampled",
+                                                                  "too_narrow", "uniform",      "no_record"};
+
+/// Counted by each thread for itself and summed; sums of integers do not depend on the order.
+struct PathStatistics {
+  std::uint64_t paths = 0;
+  std::uint64_t segments = 0;    ///< rays traced to extend paths
+  std::uint64_t shadowRays = 0;  ///< rays traced towards lights
+  std::array<std::uint64_t, kScatteringNames.size()> strategies{};
+  std::array<std::uint64_t, kGuidingDecisionNames.size()> decisions{};
+
+  void count(Strategy strategy) { ++strategies[static_cast<std::size_t>(strategy)]; }
+  void countDelta() { ++strategies.back(); }
+  void count(GuidingDecision decision) { ++decisions[static_cast<std::size_t>(decision)]; }
+  std::uint64_t rays() const { return segments + shadowRays; }
+
+  PathStatistics& operator+=(const PathStatistics& other) {
+    paths += other.paths;
+    segments += other.segments;
+    shadowRays += other.shadowRays;
+    for (std::size_t i = 0; i < strategies.size(); ++i) strategies[i] += other.strategies[i];
+    for (std::size_t i = 0; i < decisions.size(); ++i) decisions[i] += other.decisions[i];
+    return *this;
+  }
+};
+
+class Integrator {
+ public:
+  virtual ~Integrator() = default;
+  /// One unbiased estimate of the radiance that arrives along the ray. Called from many threads.
+  virtual Rgb radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const = 0;
+};
+
+}  // namespace lobe

@@ -1,0 +1,38 @@
+#pragma once
+// Path tracing with BSDF and emitter sampling.
+
+#include "runtime/render/integrators/path_loop.h"
+
+namespace lobe {
+
+/// Samples directions as the material itself does.
+struct BsdfSampler {
+  class Vertex {
+   public:
+    Vertex(const BsdfSampler&, const SurfaceHit& hit) : hit_(hit) {}
+    std::optional<BsdfSample> sample(Rng& rng, PathStatistics& statistics) const {
+      statistics.count(Strategy::bsdf);
+      const float choice = rng.uniform();
+      return sampleBsdf(hit_, choice, rng.uniform2());
+    }
+    float pdf(const Vec3& wi) const { return hit_.bsdf->pdf(hit_.wo, wi, hit_.uv); }
+
+    static std::optional<float> reflectedRadiance() { return std::nullopt; }
+
+   private:
+    const SurfaceHit& hit_;
+  };
+};
+
+class PathIntegrator : public Integrator {
+ public:
+  /// The scene outlives it.
+  PathIntegrator(const RenderScene& scene, const PathOptions& options) : scene_(scene), options_(options) {}
+  Rgb radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const override;
+
+ private:
+  const RenderScene& scene_;
+  PathOptions options_;
+};
+
+}  // namespace lobe

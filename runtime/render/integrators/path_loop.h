@@ -1,0 +1,234 @@
+#pragma once
+// The path tracer's loop, for any way of sampling directions: emission, emitter sampling with multiple importance
+// sampling (power heuristic), the delta part of materials, path russianRoulette. Only the smooth part's directions are
+// the sampler's.
+//
+// A sampler is a type with a nested Vertex, made where a path scatters at a smooth surface and gone before the next:
+//
+//   struct Sampler {
+//     class Vertex {
+//       Vertex(const Sampler& sampler, const SurfaceHit& hit);
+//       // One direction with its BSDF value and its density pdf(wi); nullopt: a sample of value zero. Counts the
+//       // strategy it chose.
+//       std::optional<BsdfSample> sample(Rng& rng, PathStatistics& statistics) const;
+//       // The density of sample over solid angle.
+//       float pdf(const Vec3& wi) const;
+//       // The radiance, luminance, that leaves towards wo by reflection, in units that all vertices share; nullopt:
+//       // not known.
+//       std::optional<float> reflectedRadiance() const;
+//     };
+//   };
+//
+// Directions are local in hit.frame, whose z is on the geometric front side: hit.wo may have z < 0. hit.bsdf exists.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "runtime/render/integrators/integrator.h"
+#include "runtime/render/lights/render_scene.h"
+
+namespace lobe {
+
+/// Russian roulette by the path's throughput, or adjoint-driven: Russian roulette and splitting keep each path's
+/// expected contribution near the estimate at its first vertex (Vorba and Křivánek 2016, "Adjoint-Driven Russian
+/// Roulette and Splitting", who compare with an estimate of the pixel; that of the first vertex has the units and the
+/// errors of those that follow). Vertices without an estimate use the throughput.
+enum class RussianRoulette { throughput, adjoint };
+
+struct PathOptions {
+  int maxDepth = std::numeric_limits<int>::max();  ///< segments: 1 shows emitters only, 2 adds direct light
+  int rouletteDepth = 5;                           ///< segments before paths may end by chance
+  RussianRoulette russianRoulette = RussianRoulette::adjoint;
+  EmitterVisibility emitterVisibility = EmitterVisibility::shown;
+};
+
+/// Upper bound of the survival probability once Russian roulette applies, so that every path ends.
+inline constexpr float kMaxSurvival = 0.95f;
+
+/// Bounds of the weight window, for the expected contribution over the reference: their ratio is 5 and their mean 1
+/// (ibid., Eq. 6).
+inline constexpr float kWeightWindowLow = 1.0f / 3.0f, kWeightWindowHigh = 5.0f / 3.0f;
+/// Lower bound of the survival probability: an estimate may be too low by any factor, and survivors are divided by it.
+inline constexpr float kLeastSurvival = 0.2f;
+/// Upper bound of the branches that splitting makes of one camera path.
+inline constexpr int kMaxBranches = 16;
+
+/// The multiple importance weight of a technique with density `own` where another has `other` (power heuristic).
+inline float misWeight(float own, float other) {
+  const float ratio = other / own;
+  return 1.0f / (1.0f + ratio * ratio);
+}
+
+template <class Sampler>
+class PathLoop {
+ public:
+  PathLoop(const RenderScene& scene, const PathOptions& options, const Sampler& sampler)
+      : scene_(scene), options_(options), sampler_(sampler) {}
+
+  Rgb radiance(const Ray& cameraRay, Rng& rng, PathStatistics& statistics) const {
+    Path path{cameraRay, rng, statistics};
+    ++statistics.paths;
+    follow(path);
+    return path.radiance;
+  }
+
+ private:
+  struct Path {
+    Ray ray;
+    Rng& rng;
+    PathStatistics& statistics;
+    Rgb radiance = Rgb::Zero();
+    Rgb throughput = Rgb::Ones();
+    float pdf = 0;  // of the last direction; 0 after the camera or a delta part: emitter sampling could not find it
+    Rgb expected = Rgb::Ones();  // product of the albedos met: what scattering leaves on average, whatever was sampled
+    float eta2 = 1;  // how much refraction has compressed radiance so far, which russianRoulette has to undo
+    Vec3 previous = Vec3::Zero();
+    int depth = 0;
+    float reference = 0;  // expected contribution of the first vertex that says; 0: none yet
+    int branches = 1;     // that the camera's path has become on the way here
+  };
+
+  void follow(Path& path) const {
+    for (++path.depth; path.depth <= options_.maxDepth; ++path.depth)
+      if (!advance(path)) break;
+  }
+
+  // One segment and what happens at its end; false: the path is over.
+  bool advance(Path& path) const {
+    ++path.statistics.segments;
+    const bool dark = path.depth == 1 && options_.emitterVisibility != EmitterVisibility::shown;
+    const std::optional<SurfaceHit> hit = dark ? firstVisible(path) : scene_.tracer.trace(path.ray);
+    if (!hit) {
+      if (dark) return false;
+      const float light = path.pdf > 0.0f ? scene_.lights.environmentPdf(path.ray.direction) : 0.0f;
+      addEmission(path, scene_.lights.environmentRadiance(path.ray.direction), light);
+      return false;
+    }
+    if (hit->emitter && !dark) addEmission(path, emittedRadiance(*hit), path.pdf > 0.0f ? lightPdf(path, *hit) : 0.0f);
+    if (!hit->bsdf || path.depth >= options_.maxDepth || !sidesAgree(*hit, hit->woWorld, hit->wo)) return false;
+    return scatter(path, *hit);
+  }
+
+  // What the camera sees where emitters do not shine on it.
+  std::optional<SurfaceHit> firstVisible(Path& path) const {
+    for (;;) {
+      std::optional<SurfaceHit> hit = scene_.tracer.trace(path.ray);
+      if (!hit || !hit->emitter || options_.emitterVisibility == EmitterVisibility::dark) return hit;
+      path.ray.tfar -= hit->distance;
+      path.ray.origin = offsetPoint(*hit, path.ray.direction);
+      ++path.statistics.segments;
+    }
+  }
+
+  float lightPdf(const Path& path, const SurfaceHit& hit) const { return scene_.lights.pdf(path.previous, hit); }
+
+  void addEmission(Path& path, const Rgb& emitted, float lightDensity) const {
+    const float weight = path.pdf > 0.0f ? misWeight(path.pdf, lightDensity) : 1.0f;
+    path.radiance += path.throughput * emitted * weight;
+  }
+
+  // By what the path carries; divides it by the probability.
+  bool survivesPlain(Path& path) const {
+    if (path.depth < options_.rouletteDepth) return true;
+    // A guided direction has a small throughput because much light is expected there: it must not die of that.
+    const float carried = std::max(path.throughput.maxCoeff() * path.eta2, path.expected.maxCoeff());
+    return survives(path, std::min(carried, kMaxSurvival));
+  }
+
+  static bool survives(Path& path, float survival) {
+    if (path.rng.uniform() >= survival) return false;
+    path.throughput /= survival;
+    return true;
+  }
+
+  // How many times the path goes on from the vertex: 0 when it ends here.
+  int continuations(Path& path, const typename Sampler::Vertex& vertex) const {
+    const std::optional<float> leaving =
+        options_.russianRoulette == RussianRoulette::adjoint ? vertex.reflectedRadiance() : std::nullopt;
+    const float expected = leaving ? luminance(path.throughput) * *leaving : 0.0f;
+    if (!leaving || !std::isfinite(expected)) return survivesPlain(path) ? 1 : 0;
+    if (path.reference <= 0) path.reference = expected;
+    const float ratio = path.reference > 0 ? expected / path.reference : 1.0f;
+    // So that every path ends.
+    const float most = path.depth >= options_.rouletteDepth ? kMaxSurvival : 1.0f;
+    if (!(ratio >= kWeightWindowLow))
+      return survives(path, std::clamp(ratio / kWeightWindowLow, kLeastSurvival, most)) ? 1 : 0;
+    if (!survives(path, most)) return 0;
+    const int room = kMaxBranches / path.branches;
+    return ratio <= kWeightWindowHigh ? 1 : std::max(1, std::min(static_cast<int>(std::min(ratio, 1e3f)), room));
+  }
+
+  bool scatter(Path& path, const SurfaceHit& hit) const {
+    const float deltaFraction = hit.bsdf->deltaProbability(hit.wo, hit.uv);
+    if (deltaFraction >= 1.0f) return survivesPlain(path) && scatterDelta(path, hit, deltaFraction);
+    const typename Sampler::Vertex vertex(sampler_, hit);
+    const int copies = continuations(path, vertex);
+    if (copies == 0) return false;
+    path.throughput /= static_cast<float>(copies);
+    path.branches *= copies;
+    for (int i = 1; i < copies; ++i) {
+      Path branch = path;
+      branch.radiance = Rgb::Zero();
+      if (scatterAt(branch, hit, vertex, deltaFraction)) follow(branch);
+      path.radiance += branch.radiance;
+    }
+    return scatterAt(path, hit, vertex, deltaFraction);
+  }
+
+  bool scatterAt(Path& path, const SurfaceHit& hit, const typename Sampler::Vertex& vertex, float deltaFraction) const {
+    addDirectLight(path, hit, vertex, 1.0f - deltaFraction);
+    if (deltaFraction <= 0.0f || path.rng.uniform() >= deltaFraction)
+      return scatterSmooth(path, hit, vertex, 1.0f - deltaFraction);
+    return scatterDelta(path, hit, deltaFraction);
+  }
+
+  void addDirectLight(Path& path, const SurfaceHit& hit, const typename Sampler::Vertex& vertex, float fraction) const {
+    const float choice = path.rng.uniform();
+    const std::optional<LightSample> light = scene_.lights.sample(hit.position, choice, path.rng.uniform2());
+    if (!light) return;
+    const Vec3 wi = hit.frame.toLocal(light->wi);
+    if (!sidesAgree(hit, light->wi, wi)) return;
+    const Rgb value = evalBsdf(hit, wi) * light->radiance;
+    if (!(value.maxCoeff() > 0.0f)) return;
+    ++path.statistics.shadowRays;
+    if (!scene_.visible(hit, *light)) return;
+    const float weight = light->delta ? 1.0f : misWeight(light->pdf, fraction * vertex.pdf(wi));
+    path.radiance += path.throughput * value * (std::abs(wi.z()) * weight / light->pdf);
+  }
+
+  bool scatterSmooth(Path& path, const SurfaceHit& hit, const typename Sampler::Vertex& vertex, float fraction) const {
+    const std::optional<BsdfSample> sample = vertex.sample(path.rng, path.statistics);
+    if (!sample) return false;
+    const float pdf = fraction * sample->pdf;
+    path.pdf = pdf;
+    path.eta2 *= sample->eta * sample->eta;
+    return continueAlong(path, hit, sample->wi, sample->f * (std::abs(sample->wi.z()) / pdf));
+  }
+
+  bool scatterDelta(Path& path, const SurfaceHit& hit, float fraction) const {
+    path.statistics.countDelta();
+    const std::optional<DeltaSample> sample = sampleDelta(hit, path.rng.uniform());
+    if (!sample) return false;
+    path.pdf = 0.0f;
+    path.eta2 *= sample->eta * sample->eta;
+    return continueAlong(path, hit, sample->wi, sample->weight / fraction);
+  }
+
+  bool continueAlong(Path& path, const SurfaceHit& hit, const Vec3& wi, const Rgb& weight) const {
+    const Vec3 direction = hit.frame.toWorld(wi).normalized();
+    if (!sidesAgree(hit, direction, wi)) return false;
+    path.throughput *= weight;
+    path.expected *= hit.bsdf->albedo(hit.wo, hit.uv);
+    path.previous = hit.position;
+    path.ray = spawnRay(hit, direction);
+    return path.throughput.maxCoeff() > 0.0f;
+  }
+
+  const RenderScene& scene_;
+  const PathOptions& options_;
+  const Sampler& sampler_;
+};
+
+}  // namespace lobe

@@ -1,0 +1,43 @@
+#pragma once
+// Renders an image in waves of samples over all pixels, in parallel by tiles.
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+
+#include "runtime/render/film/camera.h"
+#include "runtime/render/film/film.h"
+#include "runtime/render/integrators/integrator.h"
+
+namespace lobe {
+
+/// Exactly one of samples and seconds is set.
+struct RenderOptions {
+  std::uint64_t seed = 1;
+  std::optional<int> samples;     ///< per pixel: the same image for a seed, on any number of threads
+  std::optional<double> seconds;  ///< stops when another wave would not fit; at least one sample per pixel
+  int firstSample = 0;            ///< of the samples of every pixel; with it the number of samples fits an int
+
+  /// Throws std::runtime_error that names the field.
+  void validate() const;
+};
+
+struct RenderProgress {
+  double seconds;  ///< spent rendering so far, without the time spent in callbacks
+  int samples;     ///< per pixel so far
+};
+
+/// Called after each wave, from the calling thread, with the film at rest.
+using AfterWave = std::function<void(const RenderProgress&)>;
+
+struct RenderResult {
+  PathStatistics statistics;
+  RenderProgress total;
+};
+
+/// Adds samples to the film, which has the camera's size and is empty. Sample s of pixel i, counted from firstSample,
+/// draws from the random stream (seed, i, s).
+RenderResult render(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options,
+                    const AfterWave& afterWave = {});
+
+}  // namespace lobe

@@ -1,0 +1,137 @@
+#include "runtime/render/lights/environment_light.h"
+
+#include <cmath>
+
+namespace lobe {
+namespace {
+
+Rgb usable(const Rgb& c) {
+  Rgb result = c;
+  for (float& value : result)
+    if (!(value > 0.0f) || !std::isfinite(value)) value = 0.0f;
+  return result;
+}
+
+// A point of density 1 − |x| over [−1, 1], from u uniform in [0,1).
+float sampleTent(float u) {
+  return u < 0.5f ? std::sqrt(2.0f * u) - 1.0f : 1.0f - std::sqrt(2.0f - 2.0f * u);
+}
+
+}  // namespace
+
+EnvironmentLight::EnvironmentLight(const Environment& environment)
+    : width_(environment.radiance.width), height_(environment.radiance.height), toWorld_(environment.toWorld) {
+  std::vector<float> rowWeights;
+  std::vector<float> weights(width_);
+  for (int y = 0; y < height_; ++y) {
+    const float sine = std::sin(kPi * (y + 0.5f) / height_);
+    for (int x = 0; x < width_; ++x) {
+      const Rgb radiance = usable(environment.radiance.at(x, y));
+      weights[x] = luminance(radiance) * sine;
+      texels_.push_back({radiance.x(), radiance.y(), radiance.z(), weights[x]});
+    }
+    rows_.emplace_back(weights);
+    rowWeights.push_back(static_cast<float>(rows_.back().total()));
+  }
+  columns_ = DiscreteDistribution(rowWeights);
+  const double pixelArea = 2.0 * kPi * kPi / static_cast<double>(texels_.size());
+  flux_ = constant() ? 4.0 * kPi * luminance(texels_[0].head<3>()) : columns_.total() * pixelArea;
+}
+
+EnvironmentLight::Coordinates EnvironmentLight::coordinates(const Vec3& direction) const {
+  const Vec3 d = toWorld_.transpose() * direction;
+  const float sine = std::sqrt(d.x() * d.x() + d.z() * d.z());
+  const float u = std::atan2(d.x(), -d.z()) * (0.5f * kInvPi);
+  const float v = std::atan2(sine, d.y()) * kInvPi;
+  return {{(u < 0.0f ? u + 1.0f : u) * width_, v * height_}, sine};
+}
+
+Eigen::Vector2i EnvironmentLight::pixelOf(const Vec3& direction) const {
+  const Vec2 p = coordinates(direction).point;
+  return {std::min(static_cast<int>(p.x()), width_ - 1), std::min(static_cast<int>(p.y()), height_ - 1)};
+}
+
+// Columns wrap around, rows end at the poles. Pixels outside the block have no weight.
+EnvironmentLight::Texel EnvironmentLight::interpolate(const Vec2& point, const PixelBlock& block) const {
+  const float px = point.x() - 0.5f;
+  const float py = point.y() - 0.5f;
+  const float floorX = std::floor(px);
+  const float floorY = std::floor(py);
+  const float fx = px - floorX;
+  const float fy = py - floorY;
+  const int left = floorX < 0.0f ? width_ - 1 : std::min(static_cast<int>(floorX), width_ - 1);
+  const int right = left + 1 == width_ ? 0 : left + 1;
+  const int top = std::clamp(static_cast<int>(floorY), 0, height_ - 1);
+  const int bottom = std::clamp(static_cast<int>(floorY) + 1, 0, height_ - 1);
+  const auto value = [&](int x, int y) {
+    Texel result = texel(x, y);
+    if (x < block.x0 || x >= block.x1 || y < block.y0 || y >= block.y1) result.w() = 0.0f;
+    return result;
+  };
+  return (1.0f - fy) * ((1.0f - fx) * value(left, top) + fx * value(right, top)) +
+         fy * ((1.0f - fx) * value(left, bottom) + fx * value(right, bottom));
+}
+
+Vec3 EnvironmentLight::direction(const Coordinates& c) const {
+  const float azimuth = 2.0f * kPi * c.point.x() / width_;
+  const float polar = kPi * c.point.y() / height_;
+  return toWorld_ * Vec3(std::sin(azimuth) * c.sine, std::cos(polar), -std::cos(azimuth) * c.sine);
+}
+
+Rgb EnvironmentLight::radiance(const Vec3& direction) const {
+  if (constant()) return texels_[0].head<3>();
+  return interpolate(coordinates(direction).point, everything()).head<3>();
+}
+
+double EnvironmentLight::blockWeight(const PixelBlock& block) const {
+  if (block.x0 == 0 && block.x1 == width_) return columns_.mass(block.y0, block.y1);
+  double sum = 0;
+  for (int y = block.y0; y < block.y1; ++y) sum += rows_[y].mass(block.x0, block.x1);
+  return sum;
+}
+
+int EnvironmentLight::sampleRow(const PixelBlock& block, float& u) const {
+  if (block.x0 == 0 && block.x1 == width_) return static_cast<int>(columns_.sample(u, block.y0, block.y1));
+  std::vector<float> masses;
+  for (int y = block.y0; y < block.y1; ++y) masses.push_back(static_cast<float>(rows_[y].mass(block.x0, block.x1)));
+  return block.y0 + static_cast<int>(DiscreteDistribution(masses).sample(u));
+}
+
+// From interpolated weight to density over solid angle.
+float EnvironmentLight::density(float weight, float sine, const PixelBlock& block) const {
+  if (sine <= 0.0f) return 0.0f;
+  return static_cast<float>(weight * texels_.size() / (blockWeight(block) * 2.0 * kPi * kPi * sine));
+}
+
+float EnvironmentLight::pdf(const PixelBlock& block, const Vec3& direction) const {
+  if (constant()) return 0.25f * kInvPi;
+  const Coordinates c = coordinates(direction);
+  return density(interpolate(c.point, block).w(), c.sine, block);
+}
+
+float EnvironmentLight::pdf(const Vec3& direction) const {
+  return pdf(everything(), direction);
+}
+
+std::optional<EnvironmentSample> EnvironmentLight::sample(const Vec2& u) const {
+  return sample(everything(), u);
+}
+
+std::optional<EnvironmentSample> EnvironmentLight::sample(const PixelBlock& block, const Vec2& u) const {
+  if (constant()) return EnvironmentSample{squareToSphere(u), texels_[0].head<3>(), 0.25f * kInvPi};
+  Vec2 rest = u;
+  const int y = sampleRow(block, rest.y());
+  const auto x = static_cast<int>(rows_[y].sample(rest.x(), block.x0, block.x1));
+  // A pixel's share of the interpolated image is a tent about its centre: around the seam, back at the poles.
+  Coordinates c{{x + 0.5f + sampleTent(rest.x()), y + 0.5f + sampleTent(rest.y())}, 0.0f};
+  if (c.point.x() < 0.0f) c.point.x() += width_;
+  if (c.point.x() >= width_) c.point.x() -= width_;
+  c.point.y() = c.point.y() > height_ ? 2.0f * height_ - c.point.y() : std::abs(c.point.y());
+  c.sine = std::sin(kPi * c.point.y() / height_);
+  const Texel found = interpolate(c.point, block);
+  const float pdf = density(found.w(), c.sine, block);
+  if (!(pdf > 0.0f)) return std::nullopt;
+  return EnvironmentSample{direction(c), found.head<3>(), pdf};
+}
+
+}  // namespace lobe

@@ -1,0 +1,67 @@
+#include "runtime/render/training/environment_guide.h"
+
+namespace lobe {
+
+EnvironmentGuide::EnvironmentGuide(const Lights& lights)
+    : lights_(lights),
+      environment_(*lights.environment()),
+      weights_(static_cast<std::size_t>(kBlockColumns) * kBlockRows * kCells * kCells) {}
+
+PixelBlock EnvironmentGuide::block(int index) const {
+  const int column = index % kBlockColumns, row = index / kBlockColumns;
+  const int width = environment_.width(), height = environment_.height();
+  return {column * width / kBlockColumns, row * height / kBlockRows, (column + 1) * width / kBlockColumns,
+          (row + 1) * height / kBlockRows};
+}
+
+int EnvironmentGuide::blockOf(const Vec3& wi) const {
+  // The block of a pixel inverts the integer division above: the last one that begins at or before the pixel.
+  const Eigen::Vector2i pixel = environment_.pixelOf(wi);
+  const int column = ((pixel.x() + 1) * kBlockColumns - 1) / environment_.width();
+  const int row = ((pixel.y() + 1) * kBlockRows - 1) / environment_.height();
+  return row * kBlockColumns + column;
+}
+
+int EnvironmentGuide::cellOf(const Vec2& u) {
+  return static_cast<int>(u.y() * kCells) * kCells + static_cast<int>(u.x() * kCells);
+}
+
+void EnvironmentGuide::learn(const Vec3& point, const Vec3& wi, float weight) {
+  // Few importons leave: each speaks for the cells around its own, too, else the first photons of every cell that none
+  // has found yet would weigh more than all others together.
+  const Vec2 u = lights_.photonCoordinates(point, wi);
+  float* const cells = &weights_[static_cast<std::size_t>(blockOf(wi)) * kCells * kCells];
+  for (int dy = -1; dy <= 1; ++dy)
+    for (int dx = -1; dx <= 1; ++dx) {
+      const int x = std::clamp(static_cast<int>(u.x() * kCells) + dx, 0, kCells - 1);
+      const int y = (static_cast<int>(u.y() * kCells) + dy + kCells) % kCells;  // the azimuth
+      cells[y * kCells + x] += weight / static_cast<float>((1 + std::abs(dx)) * (1 + std::abs(dy)) * 4);
+    }
+}
+
+void EnvironmentGuide::update() {
+  bins_ = DiscreteDistribution(weights_);
+}
+
+std::optional<EmittedPhoton> EnvironmentGuide::sample(float choice, const Vec2& u1, const Vec2& u2) const {
+  if (!(bins_.total() > 0)) {
+    const std::optional<EnvironmentSample> from = environment_.sample(u1);
+    if (!from) return std::nullopt;
+    return lights_.photonFromEnvironment(*from, u2);
+  }
+  const std::size_t bin = bins_.sample(choice);
+  const int index = static_cast<int>(bin) / (kCells * kCells), cell = static_cast<int>(bin) % (kCells * kCells);
+  const PixelBlock pixels = block(index);
+  if (environment_.blockWeight(pixels) <= 0) return std::nullopt;
+  const std::optional<EnvironmentSample> from = environment_.sample(pixels, u1);
+  // Interpolation carries directions over a block's border; there the neighbour's photons do the work.
+  if (!from || blockOf(from->wi) != index) return std::nullopt;
+  const int row = cell / kCells;
+  const Vec2 corner(static_cast<float>(cell % kCells), static_cast<float>(row));
+  const Vec2 u = ((corner + u2) / kCells).cwiseMin(kOneMinusEpsilon);
+  const float pdf = bins_.probability(bin) * kCells * kCells * from->pdf;
+  if (!(pdf > 0)) return std::nullopt;
+  return lights_.photonFromEnvironment({from->wi, from->radiance, pdf}, u);
+}
+
+}  // namespace lobe

@@ -1,0 +1,77 @@
+#include "runtime/render/training/particle_tracer.h"
+
+#include "runtime/core/parallel.h"
+
+namespace lobe {
+namespace {
+
+constexpr int kChunk = 1024;
+// Photons come after importons in the order of paths.
+constexpr std::uint64_t kFirstPhoton = std::uint64_t{1} << 32;
+
+/// Runs trace(i, rng, result) for i below count, in chunks that any thread may take; the results come in order.
+template <class Result, class Trace>
+std::vector<Result> traceChunks(std::uint64_t seed, std::uint64_t stream, int count, const Trace& trace) {
+  const int chunks = (count + kChunk - 1) / kChunk;
+  std::vector<Result> results(chunks);
+  parallelFor(0, chunks, [&](int chunk) {
+    for (int i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
+      Rng rng(seed, stream, i);
+      trace(i, rng, results[chunk]);
+    }
+  });
+  return results;
+}
+
+}  // namespace
+
+ParticleTracer::ParticleTracer(const RenderScene& scene, const RayCamera& camera, const GuidedSampler& radiance,
+                               const GuidedSampler& importance, const EnvironmentGuide* guide, std::uint64_t seed)
+    : scene_(scene), camera_(camera), radiance_(radiance), importance_(importance), guide_(guide), seed_(seed) {}
+
+ImportonResult ParticleTracer::traceImportons(int pass, int count, const ImportonWishes& wishes) const {
+  auto results = traceChunks<ImportonResult>(
+      seed_, 2 * static_cast<std::uint64_t>(pass), count, [&](int i, Rng& rng, ImportonResult& result) {
+        const Vec2 pixel = rng.uniform2();
+        const int x = static_cast<int>(pixel.x() * static_cast<float>(camera_.width()));
+        const int y = static_cast<int>(pixel.y() * static_cast<float>(camera_.height()));
+        const Ray ray = camera_.sample(x, y, rng);
+        ImportonWalk(scene_, radiance_, wishes, rng, result).run(ray, static_cast<std::uint64_t>(i));
+      });
+  ImportonResult all;
+  for (ImportonResult& result : results) {
+    all.radiance.merge(std::move(result.radiance));
+    all.importance.merge(std::move(result.importance));
+    all.uses.insert(all.uses.end(), result.uses.begin(), result.uses.end());
+  }
+  return all;
+}
+
+PhotonResult ParticleTracer::tracePhotons(int pass, int count) const {
+  PhotonResult all;
+  if (scene_.lights.empty()) return all;
+  auto results = traceChunks<PhotonResult>(
+      seed_, 2 * static_cast<std::uint64_t>(pass) + 1, count, [&](int i, Rng& rng, PhotonResult& result) {
+        if (const std::optional<EmittedPhoton> photon = emit(rng))
+          PhotonWalk(scene_, importance_, rng, result).run(*photon, kFirstPhoton + static_cast<std::uint64_t>(i));
+      });
+  for (PhotonResult& result : results) {
+    all.radiance.merge(std::move(result.radiance));
+    all.importance.merge(std::move(result.importance));
+  }
+  return all;
+}
+
+std::optional<EmittedPhoton> ParticleTracer::emit(Rng& rng) const {
+  const float environment = guide_ ? scene_.lights.environmentProbability() : 0.0f;
+  const float choice = rng.uniform();
+  const Vec2 u1 = rng.uniform2();
+  const Vec2 u2 = rng.uniform2();
+  // The environment is the last light: choices below 1 − environment mean surfaces.
+  if (choice < 1 - environment) return scene_.lights.samplePhoton(choice, u1, u2);
+  std::optional<EmittedPhoton> photon = guide_->sample((choice - (1 - environment)) / environment, u1, u2);
+  if (photon) photon->power /= environment;
+  return photon;
+}
+
+}  // namespace lobe

@@ -1,0 +1,33 @@
+#pragma once
+// Traces the particles that training learns from, in parallel. What is traced depends on seed and pass only, never on
+// threads.
+
+#include <vector>
+
+#include "runtime/render/training/importon_walk.h"
+#include "runtime/render/training/photon_walk.h"
+
+namespace lobe {
+
+class ParticleTracer {
+ public:
+  /// All outlive it. radiance guides importons, importance guides photons; guide: where photons of the environment
+  /// start, nullptr without an environment.
+  ParticleTracer(const RenderScene& scene, const RayCamera& camera, const GuidedSampler& radiance,
+                 const GuidedSampler& importance, const EnvironmentGuide* guide, std::uint64_t seed);
+
+  ImportonResult traceImportons(int pass, int count, const ImportonWishes& wishes) const;
+  PhotonResult tracePhotons(int pass, int count) const;
+
+ private:
+  std::optional<EmittedPhoton> emit(Rng& rng) const;
+
+  const RenderScene& scene_;
+  const RayCamera& camera_;
+  const GuidedSampler& radiance_;
+  const GuidedSampler& importance_;
+  const EnvironmentGuide* guide_;
+  std::uint64_t seed_;
+};
+
+}  // namespace lobe

@@ -1,0 +1,93 @@
+#include "runtime/render/training/photon_walk.h"
+
+#include <algorithm>
+
+#include "runtime/render/integrators/public_types.h"
+
+namespace lobe {
+namespace {
+
+// The weight window (training notes, "Parameters"), in shares of the emitted power.
+constexpr float kLowestWeight = 1e-6f;
+constexpr float kHighestWeight = 2 + kLowestWeight;
+constexpr int kMaxWaiting = 64;  // of one photon that wait at a time
+// Of one photon in all. Surfaces that return more light than they receive would split it without end.
+constexpr int kMaxBranchesOfPhoton = 512;
+
+/// What BSDF sampling is left with where emitter sampling finds the same light (nothing of a delta light's); a cosine
+/// stands for the density to come.
+float directFraction(const EmittedPhoton& photon, const SurfaceHit& hit) {
+  const float cosine = std::abs(hit.normal.dot(hit.woWorld));
+  float emitter = photon.emitterDensity;
+  if (!photon.far) {
+    const float cosineAtLight = std::abs(photon.normal.dot(photon.ray.direction));
+    emitter *= hit.distance * hit.distance / std::max(cosineAtLight, 1e-6f);
+  }
+  return misWeight(std::max(cosine * kInvPi, 1e-6f), emitter);
+}
+
+}  // namespace
+
+void PhotonWalk::run(const EmittedPhoton& photon, std::uint64_t index) {
+  result_.radiance.beginPath(index);
+  result_.importance.beginPath(index);
+  power_ = luminance(photon.power);
+  if (!usable(power_)) return;
+  waiting_.push_back({{photon.ray, photon.power}, 1});
+  made_ = 0;
+  while (!waiting_.empty()) {
+    const Branch branch = waiting_.back();
+    waiting_.pop_back();
+    advance(photon, branch);
+  }
+}
+
+// One segment, what happens at its end, and the branches that leave from there.
+void PhotonWalk::advance(const EmittedPhoton& photon, Branch branch) {
+  const std::optional<SurfaceHit> hit = scene_.tracer.trace(branch.state.ray);
+  if (!hit || !hit->bsdf || !sidesAgree(*hit, hit->woWorld, hit->wo)) return;
+  std::optional<GuidedSampler::Vertex> vertex;
+  if (hit->bsdf->deltaProbability(hit->wo, hit->uv) < 1) {
+    vertex.emplace(importance_, *hit);
+    if (!vertex->distribution().hasRecord())
+      result_.importance.requestRecord(asFloats(hit->position), asFloats(normalTowards(*hit)));
+    store(photon, branch, *hit);
+  }
+  if (branch.depth == kMaxTrainingDepth) return;
+  const int branches = applyWeightWindow(branch.state.weight);
+  for (int i = 0; i < branches; ++i) {
+    const std::optional<Scattered> scattered = scatter(*hit, vertex, Transport::flux, rng_);
+    if (!scattered) continue;
+    Rgb weight = branch.state.weight * scattered->weight;
+    if (survivesAlbedo(weight, *hit, rng_))
+      waiting_.push_back({{spawnRay(*hit, scattered->direction), weight}, branch.depth + 1});
+  }
+}
+
+void PhotonWalk::store(const EmittedPhoton& photon, const Branch& branch, const SurfaceHit& hit) {
+  const bool first = branch.depth == 1;
+  const float flux = luminance(branch.state.weight);
+  const float weight = flux * (first ? directFraction(photon, hit) : 1.0f);
+  if (usable(weight))
+    result_.radiance.addPhoton(asFloats(hit.position), asFloats(normalTowards(hit)), asFloats(hit.woWorld), weight,
+                               first && photon.far ? kInfinity : hit.distance, flux);
+}
+
+// How many branches go on: none, by chance, of a photon that carries next to nothing, several of one that carries too
+// much, so that no particle to come speaks for many.
+int PhotonWalk::applyWeightWindow(Rgb& weight) {
+  const float relative = luminance(weight) / power_;
+  if (!usable(relative)) return 0;
+  if (relative < kLowestWeight) {
+    weight *= kLowestWeight / relative;
+    return rng_.uniform() * kLowestWeight < relative ? 1 : 0;
+  }
+  if (relative <= kHighestWeight) return 1;
+  const int room = std::max(1, std::min(kMaxWaiting - static_cast<int>(waiting_.size()), kMaxBranchesOfPhoton - made_));
+  const int branches = std::min(static_cast<int>(std::min(relative / 2, 1e3f)) + 1, room);
+  made_ += branches;
+  weight /= static_cast<float>(branches);
+  return branches;
+}
+
+}  // namespace lobe

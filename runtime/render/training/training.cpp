@@ -1,0 +1,169 @@
+#include "runtime/render/training/training.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include <oneapi/tbb/parallel_invoke.h>
+
+#include "runtime/core/stopwatch.h"
+
+namespace lobe {
+namespace {
+
+/// Importance only steers photons: half the components and neighbours do (measured by lobebench-illumination).
+FieldOptions importanceOptions(FieldOptions options) {
+  options.components = std::max(1, options.components / 2);
+  options.neighbours = std::max(1, options.neighbours / 2);
+  return options;
+}
+
+/// How much of the plan's particles each pass traces. All, where time is not limited. Where it is, passes begin small
+/// and double: so even short training is of several passes, and none begins that would end much too late.
+class PassSizes {
+ public:
+  explicit PassSizes(const TrainingPlan& plan) : limit_(plan.seconds), next_(limit_ < kInfinity ? firstOf(plan) : 1) {}
+
+  /// Of the next pass, in (0, 1]; nullopt: it would not end in time. The first pass always is.
+  std::optional<double> next() const {
+    if (taken_ == 0 || limit_ == kInfinity) return next_;
+    const double left = limit_ - watch_.seconds();
+    const double fitting = std::min(next_, last_ * left / taken_);
+    // A pass that brings less than the one before takes its time from rendering for little.
+    return fitting >= std::min(last_, next_) ? std::optional(fitting) : std::nullopt;
+  }
+
+  double last() const { return last_; }
+
+  void passDone(double size, double seconds) {
+    last_ = size;
+    taken_ = seconds;
+    next_ = std::min(1.0, 2 * size);
+  }
+
+ private:
+  static double firstOf(const TrainingPlan& plan) {
+    constexpr double kFirstParticles = 25000;  // a fifth of a second in the kitchen
+    return std::min(1.0, kFirstParticles / (static_cast<double>(plan.photons) + plan.importons));
+  }
+
+  double limit_, next_;
+  double last_ = 0, taken_ = 0;  // size and seconds of the last pass
+  Stopwatch watch_;
+};
+
+/// One training run. Importons are guided by the light learnt in the passes before, photons by the importance that
+/// importons have brought.
+class Training {
+ public:
+  Training(const RenderScene& scene, const RayCamera& camera, const LobeCacheSet* caches, const TrainingPlan& plan)
+      : plan_(plan),
+        radiance_(inScene(plan.records, scene)),
+        importance_(importanceOptions(inScene(plan.records, scene))),
+        radianceSampler_(scene.scene, radiance_, caches),
+        importanceSampler_(scene.scene, importance_, nullptr) {
+    const bool tracesPhotons = plan.from != TrainFrom::paths;
+    if (tracesPhotons && scene.lights.environmentProbability() > 0) guide_.emplace(scene.lights);
+    wishes_ = {guide_.has_value(), tracesPhotons, plan.from != TrainFrom::photons,
+               plan.learnFractions && caches != nullptr};
+    tracer_.emplace(scene, camera, radianceSampler_, importanceSampler_, guide_ ? &*guide_ : nullptr, plan.seed);
+  }
+  // Tracer and samplers refer to the other members.
+  Training(const Training&) = delete;
+  Training& operator=(const Training&) = delete;
+
+  /// size: see PassSizes.
+  PassReport runPass(int pass, double size) {
+    const Stopwatch watch;
+    ImportonResult importons = tracer_->traceImportons(pass, fractionOf(plan_.importons, size), wishes_);
+    if (guide_) {
+      for (const EnvironmentUse& use : importons.uses) guide_->learn(use.point, use.wi, use.weight);
+      guide_->update();
+    }
+    PhotonResult photons;
+    if (wishes_.importance) photons = tracer_->tracePhotons(pass, fractionOf(plan_.photons, size));
+    samples_ = std::move(importons.radiance);
+    samples_.merge(std::move(photons.radiance));
+    importons.importance.merge(std::move(photons.importance));
+    PassReport report{0, samples_.particles(), 0, std::nullopt};
+    // Side by side: what one has to do in order leaves room for the other.
+    oneapi::tbb::parallel_invoke([&] { importance_.update(importons.importance); },
+                                 [&] { report.logLikelihood = radiance_.update(samples_); });
+    report.records = radiance_.records();
+    report.seconds = watch.seconds();
+    return report;
+  }
+
+  /// Radii have shrunk since the last requests were made: a last look closes the gaps.
+  void finish(int passes, double size) {
+    radiance_.fill(tracer_->traceImportons(passes, fractionOf(plan_.importons, size), {}).radiance, samples_);
+  }
+
+  const Field& radiance() const { return radiance_; }
+  SampleStorage takeParticles() { return std::move(samples_); }
+
+ private:
+  static int fractionOf(int count, double size) { return std::max(1, static_cast<int>(std::lround(size * count))); }
+  static FieldOptions inScene(FieldOptions options, const RenderScene& scene) {
+    options.sceneDiagonal = scene.tracer.bounds().diagonal().norm();
+    return options;
+  }
+
+  const TrainingPlan& plan_;
+  Field radiance_, importance_;
+  GuidedSampler radianceSampler_, importanceSampler_;
+  std::optional<EnvironmentGuide> guide_;
+  ImportonWishes wishes_;
+  std::optional<ParticleTracer> tracer_;
+  SampleStorage samples_;  // of the last pass
+};
+
+}  // namespace
+
+std::map<std::string, TrainFrom> trainFromNames() {
+  return {{"photons", TrainFrom::photons}, {"paths", TrainFrom::paths}, {"both", TrainFrom::both}};
+}
+
+void TrainingPlan::validate() const {
+  const auto require = [](bool condition, const char* message) {
+    if (!condition) throw std::runtime_error(message);
+  };
+  require(passes >= 1, "training passes: at least 1");
+  require(photons >= 1, "training photons: at least 1");
+  require(importons >= 1, "training importons: at least 1");
+  require(seconds > 0, "training seconds: over 0");
+  records.validate();
+}
+
+std::uint64_t TrainingReport::particles() const {
+  std::uint64_t sum = 0;
+  for (const PassReport& pass : passes) sum += pass.particles;
+  return sum;
+}
+
+TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera& camera, const LobeCacheSet* caches,
+                                      const TrainingPlan& plan,
+                                      const std::function<void(const PassReport&)>& afterPass) {
+  plan.validate();
+  if (scene.tracer.bounds().isEmpty() || scene.lights.empty()) return {};
+  const Stopwatch watch;
+  Training training(scene, camera, caches, plan);
+  TrainingReport report;
+  PassSizes sizes(plan);
+  for (int pass = 0; pass < plan.passes; ++pass) {
+    const std::optional<double> size = sizes.next();
+    if (!size) break;
+    report.passes.push_back(training.runPass(pass, *size));
+    sizes.passDone(*size, report.passes.back().seconds);
+    if (afterPass) afterPass(report.passes.back());
+  }
+  training.finish(static_cast<int>(report.passes.size()), sizes.last());
+  report.seconds = watch.seconds();
+  report.undersampledFraction = training.radiance().undersampledFraction();
+  report.learntFractions = plan.learnFractions && caches != nullptr;
+  TrainedIllumination trained{training.radiance().frozen(), report, {}};
+  if (plan.keepParticles) trained.particles = training.takeParticles();
+  return trained;
+}
+
+}  // namespace lobe

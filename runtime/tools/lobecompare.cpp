@@ -1,0 +1,145 @@
+// lobecompare: how far images are from a reference, or what they are together.
+
+#include <cstdio>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "runtime/image/error_map.h"
+#include "runtime/image/error_metrics.h"
+#include "runtime/image/image_output.h"
+#include "runtime/image/merge.h"
+#include "runtime/tools/tool.h"
+
+namespace {
+
+struct Arguments {
+  std::string reference;
+  std::vector<std::string> images;
+  bool json = false;
+  std::string map, merge;
+  int shrink = 1;
+};
+
+struct Comparison {
+  std::string image;
+  lobe::ErrorMetrics metrics;
+};
+
+void declare(CLI::App& app, Arguments& arguments) {
+  app.add_option("REFERENCE", arguments.reference, "The image to compare with; with --merge the first of the images")
+      ->required();
+  app.add_option("IMAGE", arguments.images, "Images of the same size")->required();
+  auto* json = app.add_flag("--json", arguments.json, "Print an array of objects instead of a table");
+  auto* map = app.add_option(
+      "--map", arguments.map,
+      fmt::format("Write the relative error of each pixel of the one image as a PNG, from {:g} (black) over "
+                  "blue, red and yellow to {:g} (white)",
+                  lobe::kMapLow, lobe::kMapHigh));
+  auto* shrink =
+      app.add_option("--shrink", arguments.shrink, "First average the reference over squares of so many pixels a side")
+          ->check(CLI::Range(1, 1024));
+  app.add_option("--merge", arguments.merge,
+                 "Write the mean of the images, weighted by their numbers of samples, as an .exr; compare nothing")
+      ->excludes(json)
+      ->excludes(map)
+      ->excludes(shrink);
+}
+
+std::vector<std::filesystem::path> all(const Arguments& arguments) {
+  std::vector<std::filesystem::path> paths{arguments.reference};
+  paths.insert(paths.end(), arguments.images.begin(), arguments.images.end());
+  return paths;
+}
+
+void checkMerge(const Arguments& arguments) {
+  if (std::filesystem::path(arguments.merge).extension() != ".exr")
+    throw lobe::UsageError("--merge is written as .exr, which says how many samples it has");
+  for (const auto& path : all(arguments))
+    if (std::filesystem::weakly_canonical(path) == std::filesystem::weakly_canonical(arguments.merge))
+      throw lobe::UsageError(fmt::format("{}: would be overwritten, it is named twice", arguments.merge));
+}
+
+void checkArguments(const Arguments& arguments) {
+  if (!arguments.merge.empty()) checkMerge(arguments);
+  if (arguments.map.empty()) return;
+  if (arguments.images.size() > 1) throw lobe::UsageError("--map shows one image, but several are given");
+  if (std::filesystem::path(arguments.map).extension() != ".png") throw lobe::UsageError("--map is written as .png");
+}
+
+lobe::ErrorMetrics measure(const lobe::Image& reference, const lobe::Image& image, const std::string& name) {
+  try {
+    return lobe::compareImages(reference, image);
+  } catch (const std::runtime_error& e) {
+    throw std::runtime_error(fmt::format("{}: {}", name, e.what()));
+  }
+}
+
+Comparison compare(const lobe::Image& reference, const std::string& name, const std::string& map) {
+  const lobe::Image image = lobe::readImage(name);
+  Comparison result{name, measure(reference, image, name)};
+  if (!map.empty()) lobe::writeErrorMap(map, reference, image);
+  return result;
+}
+
+void printJson(const std::vector<Comparison>& comparisons) {
+  nlohmann::ordered_json array = nlohmann::ordered_json::array();
+  for (const auto& [image, m] : comparisons)
+    array.push_back({{"image", image},
+                     {"mse", m.mse},
+                     {"relmse", m.relmse},
+                     {"relmse_drop_0.1pct", m.relmseDrop01},
+                     {"relmse_drop_1pct", m.relmseDrop1},
+                     {"mean_ratio", m.meanRatio},
+                     {"nonfinite", m.nonfinite}});
+  fmt::print("{}\n", array.dump(2));
+}
+
+void printTable(const std::vector<Comparison>& comparisons) {
+  lobe::Table table(
+      {"image", "mse", "relmse", "without worst 0.1 %", "without worst 1 %", "ratio of means", "non-finite"});
+  for (const auto& [image, m] : comparisons)
+    table.add({image, fmt::format("{:.6g}", m.mse), fmt::format("{:.6g}", m.relmse),
+               fmt::format("{:.6g}", m.relmseDrop01), fmt::format("{:.6g}", m.relmseDrop1),
+               fmt::format("{:.5f}", m.meanRatio), fmt::format("{}", m.nonfinite)});
+  table.print(stdout);
+}
+
+lobe::Image readReference(const Arguments& arguments) {
+  const lobe::Image reference = lobe::readImage(arguments.reference);
+  try {
+    return lobe::averagedDown(reference, arguments.shrink);
+  } catch (const std::runtime_error& e) {
+    throw std::runtime_error(fmt::format("{}: {}", arguments.reference, e.what()));
+  }
+}
+
+void merge(const Arguments& arguments) {
+  const lobe::MergedImage merged = lobe::mergeImages(all(arguments));
+  lobe::writeImage(arguments.merge, merged.image, merged.attributes);
+}
+
+void run(const Arguments& arguments) {
+  checkArguments(arguments);
+  if (!arguments.merge.empty()) return merge(arguments);
+  const lobe::Image reference = readReference(arguments);
+  std::vector<Comparison> comparisons;
+  for (const std::string& name : arguments.images) comparisons.push_back(compare(reference, name, arguments.map));
+  if (arguments.json)
+    printJson(comparisons);
+  else
+    printTable(comparisons);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Arguments arguments;
+  return lobe::runTool(
+      "lobecompare", "Errors of images against a reference, as numbers and as a map; or images put together.", argc,
+      argv, [&](CLI::App& app) { declare(app, arguments); }, [&] { run(arguments); });
+}

@@ -1,0 +1,248 @@
+// lobedump FILE...: shows what caches of BRDFs (.lobe) and of illumination (.illum) hold and how good they are, as
+// tables, JSON, pictures, points or differences.
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "fitter/compile.h"
+#include "runtime/tools/cache_diff.h"
+#include "runtime/tools/cache_grid.h"
+#include "runtime/tools/cache_plot.h"
+#include "runtime/tools/cache_report.h"
+#include "runtime/tools/illumination_report.h"
+#include "runtime/tools/tool.h"
+#include "scenes/mitsuba/reader.h"
+#include "scenes/scene_lobes.h"
+
+namespace {
+
+/// Strings of damaged files may be no text.
+std::string dumped(const nlohmann::ordered_json& json) {
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+using namespace lobe;
+
+constexpr int kPlotRows = 5;
+
+const char* const kFooter =
+    R"(--plot draws a row of panels for each record, over the equal-area disc of sampled directions (x is right, y up,
+the edge is the horizon; the given direction is at positive x when its azimuth is 0). Narrow lobes are drawn larger.
+  1 target  the lobe times the cosine, normalised (only with --scene)
+  2 fit     the mixture times the cosine, normalised, with the one-sigma ellipses of its components in red
+    Both from dark violet to light yellow: a logarithmic scale over three decades below the row's peak.
+  3 ratio   target over the graded density, a tenth of the lobe's own sampler and nine tenths of the fit, from blue
+            (1/10 and below: drawn too often) over white (1) to red (10 and above: drawn too seldom); with --scene
+The ring marks the worst f/p, the largest ratio met when grading; at the border when it is out of view. Grey is outside
+the disc. A table says which record each row shows, and where.
+
+--diff ends with 0 when both caches are the same to the bit, with 1 when they differ, and with 2 on an error.)";
+
+struct Options {
+  std::vector<std::string> files;
+  bool records = false;
+  bool json = false;
+  bool diff = false;
+  std::string plot, scene, points;
+  int record = -1;
+  ReadOptions read;
+};
+
+void declare(CLI::App& app, Options& o) {
+  app.add_option("files", o.files, "Cache files: of lobes (.lobe), or of illumination (.illum)")
+      ->required()
+      ->type_name("FILE")
+      ->default_str("");
+  auto* records = app.add_flag("--records", o.records, "Also print a row for every record");
+  auto* json =
+      app.add_flag("--json", o.json, "Print everything as JSON; the records of illumination only with --records");
+  app.add_flag("--diff", o.diff, "Say what differs between two caches")->excludes(records);
+  auto* plot = app.add_option("--plot", o.plot, "Draw records of one cache: target, fit and ratio")
+                   ->type_name("OUT.png")
+                   ->default_str("")
+                   ->excludes(records)
+                   ->excludes(json)
+                   ->excludes("--diff");
+  app.add_option("--record", o.record, "Draw this one; else some from the grid's first to its last")
+      ->check(CLI::NonNegativeNumber)
+      ->default_str("")
+      ->needs(plot);
+  app.add_option("--scene", o.scene, "Where to find the lobe, for target and ratio: the scene the cache was made from")
+      ->type_name("SCENE.xml")
+      ->default_str("")
+      ->needs(plot);
+  app.add_option("--points", o.points, "Write the records of one file of illumination as a cloud of points")
+      ->type_name("OUT.ply")
+      ->default_str("")
+      ->excludes(records)
+      ->excludes(json)
+      ->excludes(plot)
+      ->excludes("--diff");
+  addDefinitions(app, o.read.definitions);
+  app.footer(kFooter);
+}
+
+void validate(const Options& o) {
+  if (o.diff && o.files.size() != 2) throw UsageError("--diff takes two cache files");
+  if (!o.points.empty()) {
+    if (o.files.size() != 1) throw UsageError("--points takes one file of illumination");
+    if (std::filesystem::path(o.points).extension() != ".ply")
+      throw UsageError(fmt::format("--points {}: points are written as .ply", o.points));
+  }
+  if (o.plot.empty()) return;
+  if (o.files.size() != 1) throw UsageError("--plot takes one cache file");
+  if (std::filesystem::path(o.plot).extension() != ".png")
+    throw UsageError(fmt::format("--plot {}: pictures are written as .png", o.plot));
+}
+
+// ---- Tables
+
+void printJson(const std::vector<LobeCache>& caches, const Options& o) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i < caches.size(); ++i) json.push_back(toJson(caches[i], o.files[i]));
+  fmt::print("{}\n", dumped(json));
+}
+
+void printText(const std::vector<LobeCache>& caches, const Options& o) {
+  std::vector<CacheReport> reports;
+  for (std::size_t i = 0; i < caches.size(); ++i) {
+    printHeader(caches[i], o.files[i], stdout);
+    if (o.records) printRecords(caches[i], stdout);
+    fmt::print("\n");
+    reports.push_back({o.files[i], caches[i].info().summary, {}, summarise(caches[i]), true, 0});
+  }
+  printReports(reports, false, stdout);
+}
+
+// ---- Differences
+
+bool runDiff(const LobeCache& a, const LobeCache& b, const Options& o) {
+  const CacheDifference difference = compareCaches(a, b);
+  const CachePair caches{a, b, o.files[0], o.files[1]};
+  if (o.json)
+    fmt::print("{}\n", dumped(toJson(difference, caches)));
+  else
+    printDifference(difference, caches, stdout);
+  return difference.equal;
+}
+
+// ---- Pictures
+
+LobePtr findLobe(const LobeCache& cache, Options& o) {
+  o.read.geometry = false;
+  // What the reader does not know cannot be the lobe.
+  o.read.lenient = true;
+  const std::vector<LobeUse> uses = collectLobes(readScene(o.scene, o.read));
+  const auto found = std::ranges::find_if(uses, [&](const LobeUse& u) { return u.lobe->key() == cache.info().key; });
+  if (found == uses.end())
+    throw std::runtime_error(
+        fmt::format("{}: no material has the lobe of {} ({}, key {}); plot without --scene, or give the scene and the "
+                    "-D that the cache was made from",
+                    o.scene, o.files[0], cache.info().summary, cache.info().key));
+  if (found->lobe->revision() != cache.info().modelRevision)
+    printWarning("lobedump", fmt::format("{}: the model's code has changed since; the target is today's", o.files[0]));
+  return found->lobe;
+}
+
+std::vector<int> chosenRecords(const LobeCache& cache, const Options& o) {
+  const int count = static_cast<int>(cache.records().size());
+  if (o.record >= count) throw UsageError(fmt::format("--record must be from 0 to {}", count - 1));
+  std::vector<int> records = o.record >= 0 ? std::vector{o.record} : spreadRecords(count, kPlotRows);
+  if (std::ranges::any_of(records, [&](int i) { return !graded(cache.records()[static_cast<std::size_t>(i)]); }))
+    throw std::runtime_error(fmt::format("{}: {} is left to the BSDF's own sampling; there is no fit to draw",
+                                         o.files[0], cache.info().summary));
+  return records;
+}
+
+std::string pointText(const Vec2& y) {
+  // Adding zero takes the sign from what is rounded to it.
+  const auto rounded = [](float v) { return std::round(1000 * v) / 1000 + 0.0f; };
+  return fmt::format("{:.3f}, {:.3f}", rounded(y.x()), rounded(y.y()));
+}
+
+void printLegend(const LobeCache& cache, const Plot& plot, const Options& o) {
+  fmt::print("{}: {} of {}, a row each\n", o.plot, o.scene.empty() ? "fit" : "target, fit and ratio",
+             cache.info().summary);
+  Table table(
+      {"row", "record", "elevation", "azimuth", "comp.", "NEV", "worst f/p", "at x, y", "view x, y", "±", "peak"});
+  for (std::size_t i = 0; i < plot.rows.size(); ++i) {
+    const PlotRow& row = plot.rows[i];
+    const CacheRecord& r = cache.records()[static_cast<std::size_t>(row.record)];
+    const Angles angles = anglesOf(directionOf(cache, static_cast<std::size_t>(row.record)));
+    table.add({std::to_string(i + 1), std::to_string(row.record), fmt::format("{:.2f}", angles.elevation),
+               fmt::format("{:.2f}", angles.azimuth), componentsText(r), gradeText(r, fmt::format("{:.4f}", r.nev)),
+               gradeText(r, fmt::format("{:.3f}", r.worstRatio)),
+               row.grade ? pointText(toDisc(row.grade->worstAt)) : "-", pointText(row.view.centre),
+               fmt::format("{:.3f}", row.view.half), fmt::format("{:.4g}", row.peak)});
+  }
+  table.print(stdout);
+}
+
+void runPlot(const LobeCache& cache, Options& o) {
+  const std::vector<int> records = chosenRecords(cache, o);
+  const LobePtr lobe = o.scene.empty() ? nullptr : findLobe(cache, o);
+  const Plot plot = plotRecords(cache, records, lobe.get());
+  plot.raster.write(o.plot);
+  printLegend(cache, plot, o);
+}
+
+// ---- Illumination
+
+bool isIllumination(const std::string& file) {
+  return isOfKind(kIlluminationFormat, MappedFile(file).bytes());
+}
+
+void validateForIllumination(const Options& o) {
+  if (o.diff || !o.plot.empty()) throw UsageError("--diff and --plot are for caches of lobes");
+  if (!std::ranges::all_of(o.files, isIllumination))
+    throw UsageError("caches of lobes and of illumination are shown by a run each");
+}
+
+void runIllumination(const Options& o) {
+  validateForIllumination(o);
+  std::vector<IlluminationFile> files;
+  for (const std::string& file : o.files) files.push_back(IlluminationFile::open(file));
+  if (!o.points.empty()) return writePoints(files[0], o.points);
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (o.json) {
+      json.push_back(toJson(files[i], o.files[i], o.records));
+      continue;
+    }
+    if (i > 0) fmt::print("\n");
+    printIllumination(files[i], o.files[i], stdout);
+    if (o.records) printRecords(files[i], stdout);
+  }
+  if (o.json) fmt::print("{}\n", dumped(json));
+}
+
+/// false: --diff found a difference.
+bool run(Options& o) {
+  validate(o);
+  if (std::ranges::any_of(o.files, isIllumination)) {
+    runIllumination(o);
+    return true;
+  }
+  if (!o.points.empty()) throw UsageError("--points is for files of illumination");
+  std::vector<LobeCache> caches;
+  for (const std::string& file : o.files) caches.push_back(LobeCache::open(file));
+  if (o.diff) return runDiff(caches[0], caches[1], o);
+  if (!o.plot.empty())
+    runPlot(caches[0], o);
+  else
+    o.json ? printJson(caches, o) : printText(caches, o);
+  return true;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  bool same = true;
+  const int code = lobe::runTool(
+      "lobedump", "Shows Gaussian-mixture caches: what they are and how good each record is.", argc, argv,
+      [&](CLI::App& app) { declare(app, options); }, [&] { same = run(options); });
+  // As cmp does, so that 1 means only one thing.
+  if (options.diff && code == 1) return 2;
+  return same ? code : 1;
+}

@@ -1,0 +1,193 @@
+// lobefit SCENE.xml [-o DIR]: compiles the lobes of a scene's materials into cache files.
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <iterator>
+#include <optional>
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+#include <nlohmann/json.hpp>
+
+#include "fitter/compile.h"
+#include "runtime/core/parallel.h"
+#include "runtime/tools/cache_report.h"
+#include "runtime/tools/check_report.h"
+#include "runtime/tools/tool.h"
+#include "scenes/mitsuba/reader.h"
+#include "scenes/scene_lobes.h"
+
+namespace {
+
+using namespace lobe;
+
+struct Options {
+  std::string scene;
+  CompileOptions compile;
+  ReadOptions read;
+  std::string method = nameOf(FitMethod::automatic);
+  std::optional<float> quality, reduction;  // where given
+  int threads = 0;
+  bool check = false;
+  bool json = false;
+};
+
+void declare(CLI::App& app, Options& o) {
+  app.add_option("scene", o.scene, "Mitsuba scene file")->required()->type_name("SCENE.xml")->default_str("");
+  app.add_option("-o,--output", o.compile.directory, "Folder of the cache files, made when missing")->type_name("DIR");
+  app.add_option("--method", o.method,
+                 "How records are fitted: auto (what is enough for --quality), wem (weighted EM), ceres (least squares "
+                 "for the product) or eq8 (the paper's)");
+  app.add_option("--components", o.compile.settings.components, "Gaussians of a record, with auto at most so many");
+  app.add_option("--quality", o.quality, "With auto, the NEV of a record's use in a product that is good enough")
+      ->default_str(fmt::format("{:g}", o.compile.settings.quality));
+  app.add_option("--elevations", o.compile.elevations, "So many records for every isotropic lobe, needed or not");
+  app.add_option("--directions", o.compile.directions, "So many records for every anisotropic lobe, needed or not");
+  app.add_option("--samples", o.compile.settings.samples, "Samples drawn for a record");
+  app.add_option("--reduction", o.reduction,
+                 "Not with auto: merge components while the sum of Runnalls' costs stays below this; 0 keeps all")
+      ->default_str(fmt::format("{:g}", o.compile.settings.reduction));
+  app.add_flag("--force", o.compile.force, "Fit again what is up to date");
+  app.add_flag("--lenient", o.read.lenient, "Replace or leave out what is at fault in the scene, with warnings");
+  app.add_flag("--check", o.check, "Only read the scene's materials and print all that is found; exit 1 on faults");
+  app.add_flag("--json", o.json, "Print the table, or what --check finds, as JSON");
+  addThreads(app, o.threads);
+  addDefinitions(app, o.read.definitions);
+}
+
+/// Options that would have no effect are slips, too.
+void takeMethod(Options& o) {
+  const std::optional<FitMethod> method = fitMethodOf(o.method);
+  if (!method)
+    throw UsageError(fmt::format("--method must be one of {}, not '{}'", fmt::join(kFitMethodNames, ", "), o.method));
+  o.compile.settings.method = *method;
+  const bool isAuto = o.compile.settings.method == FitMethod::automatic;
+  if (o.reduction && isAuto)
+    throw UsageError("--reduction is not for --method auto, which chooses how many components");
+  if (o.quality && !isAuto) throw UsageError("--quality is for --method auto, the others fit what they are told to");
+  if (o.reduction) o.compile.settings.reduction = *o.reduction;
+  if (o.quality) o.compile.settings.quality = *o.quality;
+}
+
+void validate(const Options& o) {
+  try {
+    o.compile.validate();
+  } catch (const std::runtime_error& e) {
+    throw UsageError(e.what());
+  }
+}
+
+double secondsToRun(const CompileJob& job, Progress& progress) {
+  const auto start = std::chrono::steady_clock::now();
+  runCompile(job, [&progress] { progress.advance(); });
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Faults of files begin with the file's path.
+std::string withoutPath(const std::string& fault, const std::filesystem::path& path) {
+  const std::string start = path.string() + ": ";
+  return fault.starts_with(start) ? fault.substr(start.size()) : fault;
+}
+
+CacheReport compileOne(const CompileJob& job, Progress& progress) {
+  const double seconds = job.upToDate ? 0 : secondsToRun(job, progress);
+  const LobeCache cache = LobeCache::open(job.path);
+  return {job.path, job.info.summary, job.use.materials, summarise(cache), job.upToDate, seconds};
+}
+
+/// The faults of the lobes that have no cache, as one line; the others are written.
+[[noreturn]] void failWith(const std::vector<std::string>& faults, std::size_t jobs) {
+  const std::size_t failed = faults.size();
+  std::string line = faults.front();
+  if (failed > 1) line += fmt::format(" (and {} more lobes failed)", failed - 1);
+  if (failed < jobs) line += fmt::format("; the other {} lobes are written", jobs - failed);
+  throw std::runtime_error(line);
+}
+
+std::vector<CacheReport> compileAll(const std::vector<CompileJob>& jobs) {
+  double directions = 0;
+  for (const CompileJob& job : jobs) {
+    if (!job.upToDate) directions += workOf(job);
+    if (!job.stale.empty())
+      fmt::print(stderr, "lobefit: {} is made again: {}\n", job.path.string(), withoutPath(job.stale, job.path));
+  }
+  Progress progress("fitting", directions);
+  std::vector<CacheReport> reports(jobs.size());
+  std::vector<std::string> faultOf(jobs.size());
+  // Lobes are fitted in parallel, too, because the first few directions of each leave cores idle. An exception would
+  // cancel the others, so each lobe's is kept.
+  parallelFor(std::size_t{0}, jobs.size(), [&](std::size_t i) {
+    try {
+      reports[i] = compileOne(jobs[i], progress);
+    } catch (const std::exception& error) {
+      faultOf[i] = error.what();
+    }
+  });
+  std::vector<std::string> faults;
+  std::ranges::copy_if(faultOf, std::back_inserter(faults), [](const std::string& fault) { return !fault.empty(); });
+  if (!faults.empty()) failWith(faults, jobs.size());
+  return reports;
+}
+
+void printResult(const std::vector<CacheReport>& reports, const Options& o) {
+  if (o.json) {
+    nlohmann::ordered_json json = nlohmann::ordered_json::array();
+    for (const CacheReport& r : reports) json.push_back(toJson(r));
+    fmt::print("{}\n", json.dump(2));
+    return;
+  }
+  if (!reports.empty()) printReports(reports, true, stdout);
+}
+
+void say(const std::vector<CacheReport>& reports, const Options& o) {
+  const auto fresh = std::ranges::count_if(reports, [](const CacheReport& r) { return !r.upToDate; });
+  if (reports.empty())
+    fmt::print(stderr, "lobefit: nothing to do: no material of {} has a lobe to fit\n", o.scene);
+  else if (fresh == 0)
+    fmt::print(stderr, "lobefit: nothing to do: all {} lobes in {} are up to date\n", reports.size(),
+               o.compile.directory.string());
+  else
+    fmt::print(stderr, "lobefit: {} of {} lobes written to {}\n", fresh, reports.size(), o.compile.directory.string());
+}
+
+/// What was asked for and is not reached has to be seen.
+void sayWhatMisses(const std::vector<CacheReport>& reports, const Options& o) {
+  if (o.compile.settings.method != FitMethod::automatic) return;
+  const float quality = o.compile.settings.quality;
+  const CacheReport* worst = nullptr;
+  int missing = 0;
+  for (const CacheReport& r : reports) {
+    if (r.summary.nevWorst <= quality) continue;
+    ++missing;
+    if (!worst || r.summary.nevWorst > worst->summary.nevWorst) worst = &r;
+  }
+  if (worst)
+    printNote("lobefit", fmt::format("{} of {} lobes have records above --quality {:g}; the worst NEV is {:.3f}, of {}",
+                                     missing, reports.size(), quality, worst->summary.nevWorst, worst->lobe));
+}
+
+void run(Options& o) {
+  takeMethod(o);
+  validate(o);
+  std::optional<tbb::global_control> limit;
+  if (o.threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(o.threads));
+  o.read.geometry = false;
+  if (o.check) return reportCheck(o.scene, o.read, o.json, stdout);
+  const Scene scene = readScene(o.scene, o.read);
+  for (const std::string& note : scene.notes) printNote("lobefit", note);
+  for (const std::string& warning : scene.warnings) printWarning("lobefit", warning);
+  const std::vector<CacheReport> reports = compileAll(planCompile(collectLobes(scene), o.compile));
+  say(reports, o);
+  sayWhatMisses(reports, o);
+  printResult(reports, o);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  return lobe::runTool(
+      "lobefit", "Compiles the reflectance lobes of a scene's materials into Gaussian-mixture caches.", argc, argv,
+      [&](CLI::App& app) { declare(app, options); }, [&] { run(options); });
+}

@@ -1,0 +1,182 @@
+#include "runtime/tools/tool.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+#include <string_view>
+
+#include <fmt/format.h>
+
+namespace lobe {
+namespace {
+
+int fail(const std::string& name, std::string_view message, int code) {
+  while (!message.empty()) {
+    const std::size_t end = std::min(message.find('\n'), message.size());
+    fmt::print(stderr, "{}: error: {}\n", name, message.substr(0, end));
+    message.remove_prefix(std::min(end + 1, message.size()));
+  }
+  return code;
+}
+
+/// For messages of libraries, which may be of several lines.
+std::string asOneLine(std::string message) {
+  std::ranges::replace(message, '\n', ' ');
+  return message;
+}
+
+/// Of the work: the time left is not told before so much is done, because the first steps may be unlike the others.
+constexpr double kMinFractionToExtrapolate = 0.02;
+
+/// Code points, which is what most letters of ours take on a terminal.
+std::size_t displayWidth(const std::string& text) {
+  return static_cast<std::size_t>(std::ranges::count_if(text, [](char c) { return (c & 0xc0) != 0x80; }));
+}
+
+std::string formatSeconds(double seconds) {
+  seconds = std::round(seconds);
+  if (seconds < 60) return fmt::format("{:.0f} s", seconds);
+  if (seconds < 3600) return fmt::format("{:.0f} min {:02.0f} s", std::floor(seconds / 60), std::fmod(seconds, 60));
+  return fmt::format("{:.0f} h {:02.0f} min", std::floor(seconds / 3600), std::fmod(seconds, 3600) / 60);
+}
+
+/// Replaces the old name of an option and its old values, with a note.
+void takeRenamed(const std::string& tool, const RenamedOption& option, std::vector<std::string>& arguments) {
+  const auto renameValue = [&](std::string& value) {
+    if (const auto found = option.values.find(value); found != option.values.end()) value = found->second;
+  };
+  for (std::size_t i = 0; i < arguments.size() && arguments[i] != "--"; ++i) {
+    const std::size_t equals = arguments[i].find('=');
+    if (arguments[i].substr(0, equals) != option.before) continue;
+    if (equals != std::string::npos) {
+      std::string value = arguments[i].substr(equals + 1);
+      renameValue(value);
+      arguments[i] = option.now + "=" + value;
+    } else {
+      arguments[i] = option.now;
+      if (i + 1 < arguments.size()) renameValue(arguments[i + 1]);
+    }
+    printNote(tool, fmt::format("{} is now called {}; the next version will not accept the old name", option.before,
+                                option.now));
+  }
+}
+
+}  // namespace
+
+int runTool(const std::string& name, const std::string& description, int argc, char** argv,
+            const std::function<void(CLI::App&)>& declare, const std::function<void()>& work,
+            const std::vector<RenamedOption>& renamed) {
+  CLI::App app(description, name);
+  try {
+    app.option_defaults()->always_capture_default();
+    app.set_version_flag("--version", name + " " LOBE_VERSION);
+    declare(app);
+    std::vector<std::string> arguments(argv + std::min(argc, 1), argv + argc);
+    for (const RenamedOption& option : renamed) takeRenamed(name, option, arguments);
+    std::ranges::reverse(arguments);  // the order in which CLI11 takes them
+    app.parse(arguments);
+    work();
+    if (std::fflush(stdout) != 0) throw std::runtime_error("cannot write to standard output");
+    return 0;
+  } catch (const CLI::Success& e) {
+    return app.exit(e);
+  } catch (const CLI::ParseError& e) {
+    return fail(name, asOneLine(fmt::format("{} (see {} --help)", e.what(), name)), 2);
+  } catch (const UsageError& e) {
+    return fail(name, e.what(), 2);
+  } catch (const std::bad_alloc&) {
+    return fail(name, "out of memory", 1);
+  } catch (const std::exception& e) {
+    return fail(name, e.what(), 1);
+  }
+}
+
+void printWarning(const std::string& name, const std::string& message) {
+  fmt::print(stderr, "{}: warning: {}\n", name, message);
+}
+
+void printNote(const std::string& name, const std::string& message) {
+  fmt::print(stderr, "{}: note: {}\n", name, message);
+}
+
+void addDefinitions(CLI::App& app, std::map<std::string, std::string>& definitions) {
+  const auto parse = [&definitions](const std::string& text) {
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos || equals == 0)
+      throw CLI::ValidationError("-D", "expected name=value, not '" + text + "'");
+    definitions[text.substr(0, equals)] = text.substr(equals + 1);
+  };
+  app.add_option_function<std::string>("-D", parse, "Set $name in the scene (repeatable)")
+      ->type_name("NAME=VALUE")
+      ->trigger_on_parse()
+      ->allow_extra_args(false);
+}
+
+void addThreads(CLI::App& app, int& threads) {
+  app.add_option("--threads", threads, "Threads to use (default: all cores)")
+      ->check(CLI::Range(1, 4096))
+      ->default_str("");
+}
+
+Progress::Progress(std::string label, double total)
+    : label_(std::move(label)), total_(total), terminal_(isatty(STDERR_FILENO) != 0), start_(Clock::now()) {
+  next_ = start_ + (terminal_ ? std::chrono::milliseconds(200) : std::chrono::seconds(10));
+}
+
+Progress::~Progress() {
+  if (drawn_ > 0) std::fputc('\n', stderr);
+}
+
+void Progress::advance(double n) {
+  const std::lock_guard lock(mutex_);
+  done_ += n;
+  const Clock::time_point now = Clock::now();
+  const bool finished = drawn_ > 0 && done_ >= total_;
+  if (now < next_ && !finished) return;
+  next_ = now + (terminal_ ? std::chrono::milliseconds(200) : std::chrono::seconds(10));
+  print(now);
+}
+
+void Progress::print(Clock::time_point now) {
+  const double fraction = std::clamp(total_ > 0 ? done_ / total_ : 1.0, 0.0, 1.0);
+  const double elapsed = std::chrono::duration<double>(now - start_).count();
+  std::string line = fmt::format("{}: {:3.0f} %", label_, std::floor(100 * fraction));
+  if (fraction >= 1)
+    line += ", " + formatSeconds(elapsed);
+  else if (fraction >= kMinFractionToExtrapolate)
+    line += ", " + formatSeconds(elapsed * (1 - fraction) / fraction) + " left";
+  if (!terminal_) {
+    fmt::print(stderr, "{}\n", line);
+    return;
+  }
+  const std::size_t width = displayWidth(line);
+  fmt::print(stderr, "\r{}{:{}}", line, "", std::max(drawn_, width) - width);
+  drawn_ = width;
+}
+
+Table::Table(std::vector<std::string> header, std::size_t leftColumns) : leftColumns_(leftColumns) {
+  rows_.push_back(std::move(header));
+}
+
+void Table::add(std::vector<std::string> cells) {
+  rows_.push_back(std::move(cells));
+}
+
+void Table::print(std::FILE* out) const {
+  std::vector<std::size_t> widths(rows_.front().size(), 0);
+  for (const auto& row : rows_)
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], displayWidth(row[i]));
+  for (const auto& row : rows_) {
+    std::string line;
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      const std::string padding(widths[i] - displayWidth(row[i]), ' ');
+      line += (i == 0 ? "" : "  ") + (i < leftColumns_ ? row[i] + padding : padding + row[i]);
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    fmt::print(out, "{}\n", line);
+  }
+}
+
+}  // namespace lobe

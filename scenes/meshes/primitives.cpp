@@ -1,0 +1,111 @@
+#include "scenes/meshes/primitives.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include <fmt/format.h>
+#include <Eigen/Geometry>
+
+#include "runtime/core/frame.h"
+#include "scenes/meshes/world_mesh.h"
+#include "scenes/scene_scale.h"
+
+namespace lobe {
+namespace {
+
+// Rotations are often written with six digits.
+constexpr float kTolerance = 1e-4f;
+
+/// Appends the square centre ± s ± t with corners of texture coordinates 0 and 1; s × t is its front.
+void addSquare(TriangleMesh& mesh, const Vec3& centre, const Vec3& s, const Vec3& t) {
+  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+  for (const Vec2& uv : {Vec2(0, 0), Vec2(1, 0), Vec2(1, 1), Vec2(0, 1)}) {
+    mesh.positions.push_back(centre + (2 * uv.x() - 1) * s + (2 * uv.y() - 1) * t);
+    mesh.normals.push_back(s.cross(t));
+    mesh.uvs.push_back(uv);
+  }
+  mesh.triangles.push_back({first, first + 1, first + 2});
+  mesh.triangles.push_back({first, first + 2, first + 3});
+}
+
+// In double precision, as squares of lengths may leave the range of floats.
+bool isCircle(const Eigen::Vector3d& u, const Eigen::Vector3d& v) {
+  const double square = u.squaredNorm();
+  return std::abs(v.squaredNorm() - square) <= 2 * kTolerance * square && std::abs(u.dot(v)) <= kTolerance * square;
+}
+
+bool mirrors(const Eigen::Matrix3f& linear) {
+  return linear.cast<double>().determinant() < 0;
+}
+
+/// The faces are flat, so their own normals serve faceNormals, too, and keep the front under mirroring.
+TriangleMesh finish(TriangleMesh mesh, MeshOptions options) {
+  options.faceNormals = false;
+  return toWorldMesh(std::move(mesh), options);
+}
+
+/// reach: how far the shape extends along each axis.
+void requireInRange(const Vec3& centre, const Vec3& reach) {
+  if (!isInRange(centre.cwiseAbs() + reach.cwiseAbs()))
+    throw std::runtime_error(fmt::format("coordinates over {:g} in the world are not supported", kLargestCoordinate));
+}
+
+}  // namespace
+
+TriangleMesh makeRectangle(const MeshOptions& options) {
+  TriangleMesh mesh;
+  addSquare(mesh, Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY());
+  return finish(std::move(mesh), options);
+}
+
+TriangleMesh makeCube(const MeshOptions& options) {
+  TriangleMesh mesh;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vec3 s = Vec3::Unit((axis + 1) % 3), t = Vec3::Unit((axis + 2) % 3);
+    addSquare(mesh, Vec3::Unit(axis), s, t);
+    addSquare(mesh, -Vec3::Unit(axis), t, s);
+  }
+  return finish(std::move(mesh), options);
+}
+
+Disk makeDisk(const MeshOptions& options) {
+  const Eigen::Matrix3f linear = checkedLinear(options.toWorld);
+  const Vec3 centre = options.toWorld.topRightCorner<3, 1>(), u = linear.col(0), v = linear.col(1);
+  requireInRange(centre, u.cwiseAbs() + v.cwiseAbs());
+  return {centre, u, v, mirrors(linear) != options.flipNormals};
+}
+
+Sphere makeSphere(const Vec3& centre, float radius, const MeshOptions& options) {
+  if (!(radius > 0) || !std::isfinite(radius) || !centre.allFinite())
+    throw std::runtime_error("a sphere needs a finite centre and a radius above zero");
+  const Eigen::Matrix3f linear = checkedLinear(options.toWorld);
+  const Eigen::Matrix3d squares = linear.cast<double>().transpose() * linear.cast<double>();
+  const double square = squares.trace() / 3;
+  if (!((squares - square * Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= 2 * kTolerance * square))
+    throw std::runtime_error("a sphere's transform must scale all directions alike: ellipsoids are not supported");
+  const auto scale = static_cast<float>(std::sqrt(square));
+  const Vec3 placed = linear * centre + options.toWorld.topRightCorner<3, 1>();
+  requireInRange(placed, Vec3::Constant(radius * scale));
+  return {placed, radius * scale, options.flipNormals, linear / scale};
+}
+
+Cylinder makeCylinder(const Vec3& start, const Vec3& end, float radius, const MeshOptions& options) {
+  const Vec3 along = end - start;
+  if (!(radius > 0) || !std::isfinite(radius) || !start.allFinite() || !end.allFinite() || along.isZero(0))
+    throw std::runtime_error("a cylinder needs two different finite ends and a radius above zero");
+  const Frame frame = Frame::fromNormal(along.cast<double>().normalized().cast<float>());
+  const Eigen::Matrix3f linear = checkedLinear(options.toWorld);
+  const Vec3 u = linear * (radius * frame.s), v = linear * (radius * frame.t), axis = linear * along;
+  const auto upright = [&](const Vec3& edge) {
+    const Eigen::Vector3d e = edge.cast<double>(), a = axis.cast<double>();
+    return std::abs(e.dot(a)) <= kTolerance * e.norm() * a.norm();
+  };
+  if (!isCircle(u.cast<double>(), v.cast<double>()) || !upright(u) || !upright(v))
+    throw std::runtime_error(
+        "a cylinder's transform must keep it round and upright: elliptic and oblique ones are not supported");
+  const Vec3 base = linear * start + options.toWorld.topRightCorner<3, 1>();
+  requireInRange(base, u.cwiseAbs() + v.cwiseAbs() + axis.cwiseAbs());
+  return {base, u, v, axis, options.flipNormals};
+}
+
+}  // namespace lobe

@@ -1,0 +1,101 @@
+#include "scenes/mitsuba/findings.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+namespace lobe {
+namespace {
+
+constexpr std::size_t kMostLines = 10;
+/// Of faults; a file with more is not what it is taken for.
+constexpr std::size_t kMostKinds = 10000;
+
+std::string andMore(std::size_t count) {
+  return count > 1 ? fmt::format(" ({} more of this kind)", count - 1) : "";
+}
+
+std::size_t total(const std::vector<Fault>& faults) {
+  return std::accumulate(faults.begin(), faults.end(), std::size_t{0},
+                         [](std::size_t sum, const Fault& fault) { return sum + fault.count; });
+}
+
+/// Whether lenient reading gets past all of them.
+bool areTolerable(const std::vector<Fault>& faults) {
+  return std::ranges::none_of(faults, [](const Fault& fault) { return fault.consequence.empty(); });
+}
+
+std::string describe(const std::vector<Fault>& faults) {
+  if (faults.empty()) return "it depends on what is at fault";
+  if (faults.size() == 1) return faults.front().text();
+  const std::size_t shown = std::min(kMostLines, faults.size());
+  std::string lines;
+  for (std::size_t i = 0; i < shown; ++i) lines += faults[i].text() + '\n';
+  const std::string rest =
+      shown < faults.size() ? fmt::format("; --check shows the other {}", faults.size() - shown) : "";
+  return lines + fmt::format("{} faults of {} kinds{}{}", total(faults), faults.size(), rest,
+                             areTolerable(faults) ? "; --lenient reads what can be read" : "");
+}
+
+}  // namespace
+
+std::string Fault::text() const {
+  const std::string hint = consequence.empty() ? "" : fmt::format(" (with --lenient, {})", consequence);
+  return fmt::format("{}: {}{}{}", where, message, hint, andMore(count));
+}
+
+SceneError::SceneError(std::string where, std::string message)
+    : SceneError(std::vector{Fault{std::move(where), std::move(message), ""}}) {}
+
+SceneError::SceneError(std::vector<Fault> all) : std::runtime_error(describe(all)), faults_(std::move(all)) {}
+
+void Findings::fault(std::string where, const std::string& kind, std::string message, std::string consequence) {
+  const auto [entry, isNew] = faultOfKind_.try_emplace(kind, faults_.size());
+  if (isNew && faults_.size() >= kMostKinds) throw SceneError(faults_);
+  // Definitions are read again after each included file.
+  if (!places_.insert(fmt::format("{} {}", where, kind)).second) return;
+  if (isNew)
+    faults_.push_back({std::move(where), std::move(message), std::move(consequence)});
+  else
+    ++faults_[entry->second].count;
+}
+
+void Findings::warn(const std::string& where, const std::string& kind, const std::string& message) {
+  const auto [entry, isNew] = warningOfKind_.try_emplace(kind, warnings_.size());
+  if (isNew) warnings_.push_back({where, message, 0});
+  Warning& warning = warnings_[entry->second];
+  // What is looked at twice is found twice.
+  if (warning.count == 0 || warning.where != where) ++warning.count;
+}
+
+void Findings::note(std::string text) {
+  if (std::ranges::find(notes_, text) == notes_.end()) notes_.push_back(std::move(text));
+}
+
+void Findings::noteWithoutEffect(const std::string& owner, const std::string& parameter) {
+  auto entry = std::ranges::find(withoutEffect_, owner, &WithoutEffect::owner);
+  if (entry == withoutEffect_.end()) entry = withoutEffect_.insert(entry, {owner, {}});
+  if (std::ranges::find(entry->parameters, parameter) == entry->parameters.end())
+    entry->parameters.push_back(parameter);
+}
+
+std::vector<std::string> Findings::warnings() const {
+  std::vector<std::string> lines;
+  for (const Warning& warning : warnings_)
+    lines.push_back(fmt::format("{}: {}{}", warning.where, warning.message, andMore(warning.count)));
+  return lines;
+}
+
+std::vector<std::string> Findings::notes() const {
+  std::vector<std::string> lines = notes_;
+  if (withoutEffect_.empty()) return lines;
+  std::vector<std::string> parts;
+  for (const auto& [owner, parameters] : withoutEffect_)
+    parts.push_back(fmt::format("{} of {}", fmt::join(parameters, ", "), owner));
+  lines.push_back(fmt::format("without effect on the picture: {}", fmt::join(parts, "; ")));
+  return lines;
+}
+
+}  // namespace lobe

@@ -1,0 +1,159 @@
+#include "scenes/mitsuba/reader.h"
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "scenes/mitsuba/reader_emitters.h"
+#include "scenes/mitsuba/reader_parameters.h"
+#include "scenes/mitsuba/reader_sensor.h"
+#include "scenes/mitsuba/reader_shapes.h"
+#include "scenes/mitsuba/values.h"
+#include "scenes/scene_scale.h"
+
+namespace lobe {
+namespace {
+
+constexpr std::string_view kKnown =
+    "alias, bsdf, default, emitter, film, include, integrator, medium, path, rfilter, sampler, sensor, shape, texture";
+/// Nothing to read where they stand: SceneFile has seen to them, or something may refer to them.
+constexpr std::array<std::string_view, 7> kElsewhere = {"alias", "default", "film",   "medium",
+                                                        "path",  "rfilter", "sampler"};
+
+class SceneReader {
+ public:
+  explicit SceneReader(ReadContext& context)
+      : context_(context),
+        textures_(context),
+        materials_(context, textures_),
+        shapes_(context, textures_, materials_),
+        emitters_(context, textures_) {}
+
+  void read() {
+    for (const pugi::xml_node node : context_.file.scene().children())
+      context_.attempt(fmt::format("{} is left out", nameOf(node)), [&] { readElement(node); });
+    if (!sensor_ && context_.options.geometry)
+      context_.unsupported(context_.file.scene(), "no sensor", "the scene has no <sensor>", "");
+    emitters_.finish();
+    if (!context_.options.geometry) return;
+    shapes_.readMeshes();
+    bringIntoRange();
+  }
+
+ private:
+  void readElement(pugi::xml_node node) {
+    if (SceneFile::hasUndefinedName(node)) return;
+    const std::string_view tag = elementName(node);
+    if (tag == "shape")
+      shapes_.add(node);
+    else if (tag == "bsdf")
+      materials_.check(node);
+    else if (tag == "texture")
+      textures_.read(node);
+    else if (tag == "emitter")
+      emitters_.add(node);
+    else if (tag == "sensor")
+      readFirstSensor(node);
+    else if (tag == "integrator")
+      readFirstIntegrator(node);
+    else if (std::ranges::find(kElsewhere, tag) == kElsewhere.end())
+      reject(node);
+  }
+
+  void bringIntoRange() {
+    try {
+      lobe::bringIntoRange(context_.scene);
+    } catch (const std::runtime_error& error) {
+      context_.unsupported(context_.file.scene(), "scale", error.what(), "");
+    }
+    if (context_.scene.scale != 1.0f)
+      context_.note(
+          fmt::format("all lengths are multiplied by {:g}: the scene is far from ordinary size", context_.scene.scale));
+  }
+
+  void readFirstIntegrator(pugi::xml_node node) {
+    if (integrator_) return context_.note("only the first of several integrators is used");
+    integrator_ = true;
+    readIntegrator(context_, node);
+  }
+
+  void readFirstSensor(pugi::xml_node node) {
+    if (sensor_) return context_.note("only the first of several sensors is used");
+    sensor_ = true;
+    // Without a camera there is no picture: lenient reading does not get past its faults.
+    context_.attempt("", [&] { readSensor(context_, node); });
+  }
+
+  void reject(pugi::xml_node node) {
+    rejectText(context_, node);
+    context_.unsupported(node, fmt::format("<{}> in scene", node.name()),
+                         fmt::format("unknown element <{}>; {}", node.name(), knownAre(node.name(), kKnown)),
+                         fmt::format("<{}> is left out", node.name()));
+  }
+
+  ReadContext& context_;
+  TextureReader textures_;
+  MaterialReader materials_;
+  ShapeReader shapes_;
+  EmitterReader emitters_;
+  bool sensor_ = false, integrator_ = false;
+};
+
+/// Without shapes and environment, what is at fault was all there is.
+void checkSomethingIsLeft(const std::filesystem::path& path, const Scene& scene, const ReadOptions& options,
+                          Findings& findings) {
+  if (options.lenient && options.geometry && !findings.faults().empty() && scene.shapes.empty() && !scene.environment)
+    findings.fault(path.string(), "nothing left", "without what is at fault nothing is left to draw", "");
+}
+
+Scene read(const std::filesystem::path& path, const ReadOptions& options, Findings& findings) {
+  const SceneFile file(path, options.definitions, findings);
+  Scene scene;
+  ReadContext context(file, options, scene, findings);
+  SceneReader(context).read();
+  checkSomethingIsLeft(path, scene, options, findings);
+  return scene;
+}
+
+/// Whether what was read of a scene with these faults may not be used.
+bool mustRefuse(const std::vector<Fault>& faults, const ReadOptions& options) {
+  if (faults.empty()) return false;
+  return !options.lenient || std::ranges::any_of(faults, [](const Fault& fault) { return fault.consequence.empty(); });
+}
+
+std::string asWarning(const Fault& fault) {
+  const std::string more = fault.count > 1 ? fmt::format(" ({} more of this kind)", fault.count - 1) : "";
+  return fmt::format("{}: {}: {}{}", fault.where, fault.message, fault.consequence, more);
+}
+
+}  // namespace
+
+Scene readScene(const std::filesystem::path& path, const ReadOptions& options) {
+  Findings findings;
+  Scene scene = read(path, options, findings);
+  if (mustRefuse(findings.faults(), options)) throw SceneError(findings.faults());
+  scene.warnings = findings.warnings();
+  for (const Fault& fault : findings.faults()) scene.warnings.push_back(asWarning(fault));
+  scene.notes = findings.notes();
+  return scene;
+}
+
+SceneCheck checkScene(const std::filesystem::path& path, const ReadOptions& options) {
+  Findings findings;
+  SceneCheck check;
+  try {
+    read(path, options, findings);
+    check.faults = findings.faults();
+    check.readable = !mustRefuse(check.faults, options);
+  } catch (const SceneError& error) {
+    check.faults = findings.faults();
+    check.faults.insert(check.faults.end(), error.faults().begin(), error.faults().end());
+  }
+  check.warnings = findings.warnings();
+  check.notes = findings.notes();
+  return check;
+}
+
+}  // namespace lobe

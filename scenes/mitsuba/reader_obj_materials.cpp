@@ -1,0 +1,150 @@
+#include "scenes/mitsuba/reader_obj_materials.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "runtime/core/files.h"
+#include "scenes/mitsuba/reader_parameters.h"
+
+namespace lobe {
+namespace {
+
+bool isThere(const std::filesystem::path& path) {
+  std::error_code error;
+  return std::filesystem::exists(path, error);
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, int>> ObjMaterialReader::read(pugi::xml_node shape, std::ptrdiff_t location,
+                                                                 const MeshSource& source) {
+  const ObjMaterials found = find(source);
+  if (found.library.empty()) return {};
+  Place place{shape, location, source.path.parent_path(), {}};
+  place.library = resolve(place, found.library);
+  const std::vector<MtlMaterial>& known = library(place);
+  std::vector<std::pair<std::string, int>> result;
+  for (const std::string& name : found.names) {
+    if (std::ranges::find(source.obj.materials, name) != source.obj.materials.end()) continue;
+    // Of several materials of one name the last one counts.
+    const auto material = std::find_if(known.rbegin(), known.rend(), [&](const auto& m) { return m.name == name; });
+    if (material != known.rend()) result.emplace_back(name, use(place, *material));
+  }
+  return result;
+}
+
+ObjMaterials ObjMaterialReader::find(const MeshSource& source) const {
+  try {
+    ObjMaterials found = findObjMaterials(readFile(source.path), source.obj.mesh);
+    if (source.obj.grouping == ObjGrouping::collapsed) found.names = {found.last};
+    return found;
+  } catch (const std::runtime_error&) {
+    return {};  // the reader of the mesh says why
+  }
+}
+
+std::filesystem::path ObjMaterialReader::resolve(const Place& place, std::string name) const {
+  std::ranges::replace(name, '\\', '/');
+  const std::filesystem::path bare = std::filesystem::path(name).filename();
+  for (const std::filesystem::path& candidate : {std::filesystem::path(name), bare}) {
+    if (isThere(place.folder / candidate)) return place.folder / candidate;
+    std::filesystem::path elsewhere = context_.file.resolve(candidate.string(), place.location);
+    if (isThere(elsewhere)) return elsewhere;
+  }
+  return context_.file.resolve((place.folder / name).string(), place.location);
+}
+
+const std::vector<MtlMaterial>& ObjMaterialReader::library(const Place& place) {
+  const auto [entry, isNew] = libraries_.try_emplace(place.library);
+  if (!isNew) return entry->second;
+  try {
+    entry->second = nameErrors(place.library, [&] { return parseMtl(readFile(place.library)); });
+  } catch (const std::runtime_error& error) {
+    context_.warn(place.location, fmt::format("material library {}", place.library.string()),
+                  fmt::format("{}: material library: {}: diffuse 0.5 is used", describe(place.shape), error.what()));
+  }
+  return entry->second;
+}
+
+int ObjMaterialReader::use(const Place& place, const MtlMaterial& material) {
+  const auto [entry, isNew] = used_.try_emplace({place.library, material.name});
+  if (isNew) entry->second = materials_.add(material.name, make(place, material));
+  return entry->second;
+}
+
+MaterialReader::Made ObjMaterialReader::make(const Place& place, const MtlMaterial& material) {
+  for (const std::string& fault : material.faults)
+    context_.warn(place.location, fault, fmt::format("{}: {}", place.library.string(), fault));
+  MaterialReader::Made made = makeModel(place, material);
+  if (!material.bumpFile.empty()) {
+    Parameters parameters;
+    parameters.set("texture", texture(place, material.bumpFile, Encoded::asGivenSigned), place.location);
+    made = wrap(place, material, "bumpmap", std::move(parameters), made);
+  }
+  if (!material.opacityFile.empty() || material.opacity != 1.0f) {
+    Parameters parameters;
+    setColour(place, grey(material.opacity), material.opacityFile, "opacity", parameters);
+    made = wrap(place, material, "mask", std::move(parameters), made);
+  }
+  return made;
+}
+
+/// What becomes of the numbers of illumination models is Mitsuba's choice.
+MaterialReader::Made ObjMaterialReader::makeModel(const Place& place, const MtlMaterial& material) {
+  Parameters parameters;
+  const int model = material.illumination;
+  if (model == 4 || model == 6 || model == 7 || model == 9) return makeOf(place, material, "dielectric", parameters);
+  if (model == 5 || model == 8) {
+    parameters.set("material", std::string("Al"), place.location);
+    return makeOf(place, material, "conductor", std::move(parameters));
+  }
+  const bool shines = (!material.specularFile.empty() || !material.specular.isZero()) && material.exponent != 0.0f;
+  const bool phong = model == 2 && shines;
+  setColour(place, material.diffuse, material.diffuseFile, phong ? "diffuse_reflectance" : "reflectance", parameters);
+  if (!phong) return makeOf(place, material, "diffuse", std::move(parameters));
+  setColour(place, material.specular, material.specularFile, "specular_reflectance", parameters);
+  parameters.set("exponent", static_cast<double>(material.exponent), place.location);
+  return makeOf(place, material, "phong", std::move(parameters));
+}
+
+MaterialReader::Made ObjMaterialReader::makeOf(const Place& place, const MtlMaterial& material, const std::string& type,
+                                               Parameters parameters, const std::vector<std::uint64_t>& children) {
+  // Mitsuba 0.6, the only one to read libraries, keeps reflectances from exceeding 1.
+  parameters.setDefault("ensure_energy_conservation", true);
+  return makeFrom(context_, place.shape, std::move(parameters), [&](const Parameters& p) {
+    try {
+      return MaterialReader::makeOf(type, p, children);
+    } catch (const ParameterError& error) {
+      throw ParameterError(error.name,
+                           fmt::format("{}: material \"{}\": {}", place.library.string(), material.name, error.what()));
+    }
+  });
+}
+
+MaterialReader::Made ObjMaterialReader::wrap(const Place& place, const MtlMaterial& material, const std::string& type,
+                                             Parameters parameters, const MaterialReader::Made& nested) {
+  parameters.addChild(nested.bsdf);
+  return makeOf(place, material, type, std::move(parameters), {nested.fingerprint});
+}
+
+TexturePtr ObjMaterialReader::texture(const Place& place, const std::string& file, Encoded encoded) {
+  const std::filesystem::path path = resolve(place, file);
+  if (isThere(path)) return textures_.readFile(place.shape, place.location, path, encoded);
+  context_.warn(place.location, "missing image " + path.string(),
+                fmt::format("{}: {}: image {} is not there: black is used", describe(place.shape),
+                            place.library.string(), path.string()));
+  return constantTexture(Rgb::Zero());
+}
+
+void ObjMaterialReader::setColour(const Place& place, const Rgb& colour, const std::string& file,
+                                  const std::string& name, Parameters& parameters) {
+  if (file.empty())
+    parameters.set(name, colour, place.location);
+  else
+    parameters.set(name, texture(place, file, Encoded::asGiven), place.location);
+}
+
+}  // namespace lobe

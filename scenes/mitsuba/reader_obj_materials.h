@@ -1,0 +1,58 @@
+#pragma once
+// The materials of OBJ files that have a library (MTL) of their own, as Mitsuba 0.6 makes them.
+
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "scenes/meshes/mesh_source.h"
+#include "scenes/meshes/mtl.h"
+#include "scenes/meshes/obj_text.h"
+#include "scenes/mitsuba/reader_materials.h"
+
+namespace lobe {
+
+class ObjMaterialReader {
+ public:
+  ObjMaterialReader(ReadContext& context, TextureReader& textures, MaterialReader& materials)
+      : context_(context), textures_(textures), materials_(materials) {}
+
+  /// Names and indices in Scene::materials of what the library has for the OBJ's selected faces; nothing for the names
+  /// that the selection has already. A library or image that is not there is warned of, at the location, which is that
+  /// of the OBJ's name in the shape. An OBJ that cannot be read has no materials.
+  std::vector<std::pair<std::string, int>> read(pugi::xml_node shape, std::ptrdiff_t location,
+                                                const MeshSource& source);
+
+ private:
+  /// What all that is read for one shape has in common.
+  struct Place {
+    pugi::xml_node shape;
+    std::ptrdiff_t location;
+    std::filesystem::path folder;   ///< of the OBJ
+    std::filesystem::path library;  ///< empty without one
+  };
+
+  ObjMaterials find(const MeshSource& source) const;
+  /// A file that the OBJ or its library names: beside the OBJ, or where the scene's files are.
+  std::filesystem::path resolve(const Place& place, std::string name) const;
+  const std::vector<MtlMaterial>& library(const Place& place);
+  int use(const Place& place, const MtlMaterial& material);
+  MaterialReader::Made make(const Place& place, const MtlMaterial& material);
+  MaterialReader::Made makeModel(const Place& place, const MtlMaterial& material);
+  MaterialReader::Made makeOf(const Place& place, const MtlMaterial& material, const std::string& type,
+                              Parameters parameters, const std::vector<std::uint64_t>& children = {});
+  MaterialReader::Made wrap(const Place& place, const MtlMaterial& material, const std::string& type,
+                            Parameters parameters, const MaterialReader::Made& nested);
+  TexturePtr texture(const Place& place, const std::string& file, Encoded encoded);
+  void setColour(const Place& place, const Rgb& colour, const std::string& file, const std::string& name,
+                 Parameters& parameters);
+
+  ReadContext& context_;
+  TextureReader& textures_;
+  MaterialReader& materials_;
+  std::map<std::filesystem::path, std::vector<MtlMaterial>> libraries_;
+  std::map<std::pair<std::filesystem::path, std::string>, int> used_;  // by library and name
+};
+
+}  // namespace lobe

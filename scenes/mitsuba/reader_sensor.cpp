@@ -1,0 +1,308 @@
+#include "scenes/mitsuba/reader_sensor.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "scenes/camera.h"
+#include "scenes/mitsuba/reader_parameters.h"
+#include "scenes/mitsuba/values.h"
+
+namespace lobe {
+namespace {
+
+constexpr std::array<std::string_view, 5> kAxes = {"x", "y", "diagonal", "smaller", "larger"};
+
+/// Mitsuba's when a film names none.
+constexpr PixelFilter kDefaultFilter{PixelFilter::Kind::gaussian, 2.0f, 0.5f};
+
+constexpr std::array<std::string_view, 6> kFilters = {"box", "catmullrom", "gaussian", "lanczos", "mitchell", "tent"};
+
+/// As Mitsuba has them: it spans the Gaussian over four standard deviations to each side.
+PixelFilter makeFilter(const std::string& type, const Parameters& parameters) {
+  const auto number = [&](const char* name, double fallback) {
+    const double value = parameters.number(name, fallback);
+    if (!(value > 0.0)) throw ParameterError(name, fmt::format("{} must be positive, not {}", name, value));
+    return static_cast<float>(value);
+  };
+  if (type == "box") return {PixelFilter::Kind::box, number("radius", 0.5), 0.5f};
+  if (type == "tent") return {PixelFilter::Kind::tent, number("radius", 1.0), 0.5f};
+  if (type == "catmullrom") return {PixelFilter::Kind::mitchell, 2.0f, 0.5f, 0.0f, 0.5f};
+  if (type == "lanczos") return {PixelFilter::Kind::lanczos, number("lobes", 3.0)};
+  if (type == "mitchell") {
+    const auto fraction = [&](const char* name) { return static_cast<float>(parameters.number(name, 1.0 / 3.0)); };
+    // Mitsuba 3 calls them A and B, 0.6 B and C.
+    const bool new3 = parameters.has("a");
+    return {PixelFilter::Kind::mitchell, number("radius", 2.0), 0.5f, fraction(new3 ? "a" : "b"),
+            fraction(new3 ? "b" : "c")};
+  }
+  const float stddev = number("stddev", 0.5);
+  return {PixelFilter::Kind::gaussian, 4.0f * stddev, stddev};
+}
+
+void readFilter(ReadContext& context, pugi::xml_node node) {
+  const std::string type = typeOf(context, node);
+  if (std::ranges::find(kFilters, type) == kFilters.end()) {
+    context.unsupported(node, "rfilter " + type,
+                        fmt::format("unknown rfilter type \"{}\"; {}", type,
+                                    knownAre(type, fmt::format("{}", fmt::join(kFilters, ", ")))),
+                        "a Gaussian filter is used");
+    return;
+  }
+  const Parameters parameters = readParameters(context, node);
+  context.scene.filter = makeFrom(context, node, parameters, [&](const Parameters& p) { return makeFilter(type, p); });
+}
+
+int readPixels(const Parameters& parameters, const char* name, int fallback, int smallest, int largest) {
+  const double value = parameters.number(name, fallback);
+  if (!(value >= smallest && value <= largest) || value != std::floor(value))
+    throw ParameterError(name,
+                         fmt::format("{} must be an integer from {} to {}, not {}", name, smallest, largest, value));
+  return static_cast<int>(value);
+}
+
+constexpr std::array<const char*, 4> kCropParameters = {"crop_offset_x", "crop_offset_y", "crop_width", "crop_height"};
+
+struct FilmSize {
+  int width, height;
+  std::optional<FilmCrop> crop;
+};
+
+FilmSize readSize(const Parameters& parameters, const Camera& camera) {
+  constexpr int kLargest = 1 << 16;
+  FilmSize size;
+  size.width = readPixels(parameters, "width", camera.width, 1, kLargest);
+  size.height = readPixels(parameters, "height", camera.height, 1, kLargest);
+  if (std::ranges::none_of(kCropParameters, [&](const char* name) { return parameters.has(name); })) return size;
+  FilmCrop crop;
+  crop.x = readPixels(parameters, "crop_offset_x", 0, 0, size.width - 1);
+  crop.y = readPixels(parameters, "crop_offset_y", 0, 0, size.height - 1);
+  crop.width = readPixels(parameters, "crop_width", size.width - crop.x, 1, size.width - crop.x);
+  crop.height = readPixels(parameters, "crop_height", size.height - crop.y, 1, size.height - crop.y);
+  size.crop = crop;
+  return size;
+}
+
+/// What a film makes of the radiance that it has recorded is not applied: EXR files hold it as it is, PNG files in
+/// sRGB.
+void noteDevelopment(ReadContext& context, pugi::xml_node node, Parameters& parameters) {
+  constexpr std::array<const char*, 6> kNames = {"burn", "exposure", "gamma", "key", "pixel_format", "tonemap_method"};
+  for (const char* name : kNames) {
+    if (!parameters.contains(name)) continue;
+    const bool isRgb = parameters.holdsText(name) && parameters.text(name, "").starts_with("rgb");
+    if (!isRgb)
+      context.note(fmt::format("{}: {} is not applied: pictures hold linear RGB radiance", describe(node), name));
+    parameters.erase(name);
+  }
+}
+
+void readFilm(ReadContext& context, pugi::xml_node node) {
+  const auto onChild = [&](pugi::xml_node child, const std::string&, Parameters&) {
+    if (elementName(child) != "rfilter") return false;
+    readFilter(context, child);
+    return true;
+  };
+  Parameters parameters = readParameters(context, node, "rfilter", onChild);
+  noteDevelopment(context, node, parameters);
+  Camera& camera = context.scene.camera;
+  const FilmSize size = makeFrom(context, node, parameters, [&](const Parameters& p) { return readSize(p, camera); });
+  camera.width = size.width;
+  camera.height = size.height;
+  camera.crop = size.crop;
+}
+
+void noteSampler(ReadContext& context, pugi::xml_node node) {
+  context.note(fmt::format("sampler \"{}\" is replaced by ours; samples are set on the command line",
+                           node.attribute("type").value()));
+}
+
+/// "50mm" on a 36 mm × 24 mm film, as the angle over its diagonal.
+float fieldOfViewOf(const std::string& focalLength) {
+  std::string_view digits = focalLength;
+  if (digits.ends_with("mm")) digits.remove_suffix(2);
+  const std::optional<double> millimetres = parseNumber(digits);
+  if (!millimetres || !(*millimetres > 0.0))
+    throw ParameterError("focal_length", fmt::format("\"{}\" is not a length in mm such as 50mm", focalLength));
+  return static_cast<float>(2.0 * std::atan(std::hypot(36.0, 24.0) / (2.0 * *millimetres)) * 180.0 / std::numbers::pi);
+}
+
+}  // namespace
+
+void readFieldOfView(const Parameters& parameters, Camera& camera) {
+  if (!parameters.has("fov")) {
+    camera.fov = fieldOfViewOf(parameters.text("focal_length", "50mm"));
+    camera.fovAxis = "diagonal";
+    if (parameters.has("fov_axis")) throw ParameterError("fov_axis", "fov_axis needs a fov");
+    return;
+  }
+  if (parameters.has("focal_length")) throw ParameterError("focal_length", "give either fov or focal_length");
+  camera.fov = static_cast<float>(parameters.number("fov", 0));
+  if (!(camera.fov > 0.0f && camera.fov < 180.0f))
+    throw ParameterError("fov", fmt::format("fov must be between 0 and 180 degrees, not {}", camera.fov));
+  camera.fovAxis = parameters.text("fov_axis", "x");
+  if (std::ranges::find(kAxes, camera.fovAxis) == kAxes.end())
+    throw ParameterError("fov_axis",
+                         fmt::format("unknown fov_axis \"{}\"; known are {}", camera.fovAxis, fmt::join(kAxes, ", ")));
+}
+
+namespace {
+
+void readLens(const Parameters& parameters, Camera& camera) {
+  if (!parameters.has("aperture_radius")) throw ParameterError("", "the parameter \"aperture_radius\" is needed");
+  camera.apertureRadius = static_cast<float>(parameters.number("aperture_radius", 0));
+  if (!(camera.apertureRadius >= 0.0f))
+    throw ParameterError("aperture_radius",
+                         fmt::format("aperture_radius must not be negative, not {}", camera.apertureRadius));
+  constexpr double kFar = 1e4;  // Mitsuba's far_clip is where it focuses unless told otherwise
+  camera.focusDistance = static_cast<float>(parameters.number("focus_distance", parameters.number("far_clip", kFar)));
+  if (!(camera.focusDistance > 0.0f))
+    throw ParameterError("focus_distance",
+                         fmt::format("focus_distance must be positive, not {}", camera.focusDistance));
+}
+
+/// Distances along the viewing axis; planes that the file does not mention are not there.
+void readClipPlanes(const Parameters& parameters, Camera& camera) {
+  camera.nearClip = static_cast<float>(parameters.number("near_clip", 0));
+  camera.farClip = parameters.has("far_clip") ? static_cast<float>(parameters.number("far_clip", 0)) : camera.farClip;
+  if (!(camera.nearClip >= 0.0f))
+    throw ParameterError("near_clip", fmt::format("near_clip must not be negative, not {}", camera.nearClip));
+  if (!(camera.farClip > camera.nearClip))
+    throw ParameterError("far_clip",
+                         fmt::format("far_clip must be over near_clip, {}, not {}", camera.nearClip, camera.farClip));
+}
+
+void readPerspective(const Parameters& parameters, Camera& camera) {
+  readFieldOfView(parameters, camera);
+  camera.horizontalFov = horizontalFov(camera, camera.width, camera.height);
+  camera.shift = Vec2(static_cast<float>(parameters.number("principal_point_offset_x", 0)),
+                      static_cast<float>(parameters.number("principal_point_offset_y", 0)));
+}
+
+/// In the order of Camera::Kind.
+constexpr std::array<std::string_view, 3> kCameras = {"perspective", "thinlens", "orthographic"};
+
+/// The camera on the film that has been read.
+Camera readCamera(ReadContext& context, pugi::xml_node node, const Parameters& parameters, Camera::Kind kind) {
+  Camera camera = context.scene.camera;
+  camera.kind = kind;
+  camera.toWorld = placeInWorld(parameters);
+  if (kind != Camera::Kind::orthographic) readPerspective(parameters, camera);
+  if (kind == Camera::Kind::thinlens) readLens(parameters, camera);
+  readClipPlanes(parameters, camera);
+  // Only a lens has a plane in focus.
+  if (kind != Camera::Kind::thinlens && parameters.has("focus_distance")) {
+    parameters.number("focus_distance", 0);
+    context.findings.noteWithoutEffect(describe(node), "focus_distance");
+  }
+  return camera;
+}
+
+/// Integrators that show something else than the light that arrives.
+constexpr std::array<std::string_view, 6> kNotOfLight = {"albedo", "ao", "depth", "field", "motion", "normal"};
+
+/// Those whose parameters are known.
+constexpr std::array<std::string_view, 5> kPathTracers = {"direct", "path", "volpath", "volpath_simple", "volpathmis"};
+
+/// How much light an integrator leaves out.
+struct LightTransport {
+  std::optional<int> maxDepth;
+  bool hideEmitters = false;
+};
+
+std::optional<int> readMaxDepth(const Parameters& parameters) {
+  if (!parameters.has("max_depth")) return std::nullopt;
+  const double depth = parameters.number("max_depth", -1);
+  if (!(depth >= -1 && depth <= 1e9) || depth != std::floor(depth))
+    throw ParameterError("max_depth",
+                         fmt::format("max_depth must be an integer from 0, or -1 for no limit, not {}", depth));
+  return depth < 0 ? std::nullopt : std::optional(static_cast<int>(depth));
+}
+
+LightTransport readTransport(const std::string& type, const Parameters& parameters) {
+  LightTransport transport;
+  transport.maxDepth = readMaxDepth(parameters);
+  constexpr int kDirect = 2;  // segments
+  if (type == "direct") transport.maxDepth = std::min(transport.maxDepth.value_or(kDirect), kDirect);
+  transport.hideEmitters = parameters.flag("hide_emitters", false);
+  if (parameters.has("strict_normals") && !parameters.flag("strict_normals", true))
+    parameters.warn("strict_normals",
+                    "strict normals are always on: directions on which the shading normal and the "
+                    "surface disagree carry no light");
+  return transport;
+}
+
+/// Of those that others know, only what is known here; their other parameters are theirs alone.
+void keepTransport(ReadContext& context, pugi::xml_node node, Parameters& parameters) {
+  for (const std::string& name : parameters.unused()) {
+    if (name == "max_depth" || name == "hide_emitters" || name == "strict_normals") continue;
+    context.findings.noteWithoutEffect(describe(node), name);
+    parameters.erase(name);
+  }
+}
+
+/// Of the integrator or, for one that wraps another, of the inner one.
+LightTransport readTransportOf(ReadContext& context, pugi::xml_node node) {
+  const std::string type = node.attribute("type").value();
+  std::optional<LightTransport> nested;
+  const auto onChild = [&](pugi::xml_node child, const std::string&, Parameters&) {
+    if (elementName(child) == "integrator") nested = readTransportOf(context, child);
+    return true;  // whatever else belongs to how it integrates
+  };
+  if (std::ranges::find(kNotOfLight, type) != kNotOfLight.end())
+    context.unsupported(node, "integrator " + type,
+                        fmt::format("integrator \"{}\" shows something else than light", type),
+                        "the light is rendered");
+  Parameters parameters = readParameters(context, node, "integrator", onChild);
+  if (std::ranges::find(kPathTracers, type) == kPathTracers.end()) keepTransport(context, node, parameters);
+  const LightTransport own =
+      makeFrom(context, node, parameters, [&](const Parameters& p) { return readTransport(type, p); });
+  return nested.value_or(own);
+}
+
+}  // namespace
+
+void readSensor(ReadContext& context, pugi::xml_node node) {
+  const std::string type = typeOf(context, node);
+  const auto known = std::ranges::find(kCameras, type);
+  if (known == kCameras.end())
+    context.unsupported(node, "sensor " + type,
+                        fmt::format("unknown sensor type \"{}\"; {}", type,
+                                    knownAre(type, fmt::format("{}", fmt::join(kCameras, ", ")))),
+                        "it is taken for perspective");
+  const auto kind =
+      known == kCameras.end() ? Camera::Kind::perspective : static_cast<Camera::Kind>(known - kCameras.begin());
+  context.scene.filter = kDefaultFilter;
+  const auto onChild = [&](pugi::xml_node child, const std::string&, Parameters&) {
+    const std::string_view tag = elementName(child);
+    if (tag == "film")
+      readFilm(context, child);
+    else if (tag == "sampler")
+      noteSampler(context, child);
+    else if (tag == "medium")
+      rejectMedium(context, child);
+    return tag == "film" || tag == "sampler" || tag == "medium";
+  };
+  const Parameters parameters = readParameters(context, node, "film, sampler", onChild);
+  context.scene.camera =
+      makeFrom(context, node, parameters, [&](const Parameters& p) { return readCamera(context, node, p, kind); });
+}
+
+void readIntegrator(ReadContext& context, pugi::xml_node node) {
+  const LightTransport transport = readTransportOf(context, node);
+  Scene& scene = context.scene;
+  scene.maxDepth = transport.maxDepth;
+  if (transport.hideEmitters)
+    scene.emitterVisibility = context.file.isOfToday() ? EmitterVisibility::hidden : EmitterVisibility::dark;
+  std::string kept;
+  if (transport.maxDepth)
+    kept += fmt::format("; paths have at most {} segments, as there, unless the command line says otherwise",
+                        *transport.maxDepth);
+  if (transport.hideEmitters) kept += "; emitters are hidden, as there";
+  context.note(fmt::format("integrator \"{}\" is replaced by ours{}", node.attribute("type").value(), kept));
+}
+
+}  // namespace lobe

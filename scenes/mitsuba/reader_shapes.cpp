@@ -1,0 +1,323 @@
+#include "scenes/mitsuba/reader_shapes.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <exception>
+
+#include <fmt/format.h>
+
+#include "runtime/core/parallel.h"
+#include "scenes/meshes/primitives.h"
+#include "scenes/mitsuba/emission.h"
+#include "scenes/mitsuba/reader_parameters.h"
+#include "scenes/mitsuba/values.h"
+#include "scenes/scene_scale.h"
+
+namespace lobe {
+namespace {
+
+constexpr std::array<std::string_view, 10> kTypes = {"cube", "cylinder",  "disk",       "instance",   "obj",
+                                                     "ply",  "rectangle", "serialized", "shapegroup", "sphere"};
+constexpr int kTop = -1;
+
+bool isMesh(std::string_view type) {
+  return type == "obj" || type == "ply" || type == "serialized";
+}
+
+std::optional<float> readSmoothAngle(const Parameters& parameters) {
+  if (!parameters.has("max_smooth_angle")) return std::nullopt;
+  const double degrees = parameters.number("max_smooth_angle", 0);
+  if (!(degrees >= 0 && degrees <= 180))
+    throw ParameterError("max_smooth_angle",
+                         fmt::format("max_smooth_angle must be between 0 and 180 degrees, not {}", degrees));
+  return static_cast<float>(degrees);
+}
+
+MeshOptions readOptions(const std::string& type, const Parameters& parameters) {
+  MeshOptions options;
+  options.toWorld = toWorld(parameters);
+  options.flipNormals = parameters.flag("flip_normals", false);
+  if (!isMesh(type)) return options;
+  options.faceNormals = parameters.flag("face_normals", false);
+  options.maxSmoothAngle = readSmoothAngle(parameters);
+  if (options.faceNormals && options.maxSmoothAngle)
+    throw ParameterError("max_smooth_angle", "give either face_normals or max_smooth_angle");
+  // Mitsuba flips what an OBJ holds unless told otherwise, and the reader of OBJ files does so by itself.
+  const bool usual = type == "obj";
+  options.flipTexCoords = parameters.flag("flip_tex_coords", usual) != usual;
+  return options;
+}
+
+float readRadius(const Parameters& parameters) {
+  const double radius = parameters.number("radius", 1.0);
+  if (!(radius > 0.0)) throw ParameterError("radius", fmt::format("the radius must be positive, not {}", radius));
+  return static_cast<float>(radius);
+}
+
+Sphere makeSphereFrom(const Parameters& parameters, const MeshOptions& options) {
+  return makeSphere(parameters.colour("center", Rgb::Zero()).matrix(), readRadius(parameters), options);
+}
+
+Cylinder makeCylinderFrom(const Parameters& parameters, const MeshOptions& options) {
+  const Vec3 start = parameters.colour("p0", Rgb::Zero()).matrix();
+  const Vec3 end = parameters.colour("p1", Rgb(0, 0, 1)).matrix();
+  if (start == end) throw ParameterError("p1", "a cylinder's ends p0 and p1 must differ");
+  return makeCylinder(start, end, readRadius(parameters), options);
+}
+
+Geometry makePrimitive(const std::string& type, const Parameters& parameters, const MeshOptions& options) {
+  try {
+    if (type == "rectangle") return makeRectangle(options);
+    if (type == "cube") return makeCube(options);
+    if (type == "disk") return makeDisk(options);
+    if (type == "cylinder") return makeCylinderFrom(parameters, options);
+    return makeSphereFrom(parameters, options);
+  } catch (const ParameterError&) {
+    throw;
+  } catch (const std::runtime_error& error) {
+    throw ParameterError("to_world", error.what());
+  }
+}
+
+int readIndex(const Parameters& parameters, int fallback) {
+  const double index = parameters.number("shape_index", fallback);
+  if (!(index >= std::min(fallback, 0) && index <= 1e9) || index != std::floor(index))
+    throw ParameterError("shape_index", fmt::format("shape_index must be a whole number from 0, not {}", index));
+  return static_cast<int>(index);
+}
+
+ObjGrouping readGrouping(const Parameters& parameters, bool isOfToday) {
+  if (parameters.flag("collapse", false)) return ObjGrouping::collapsed;
+  return isOfToday ? ObjGrouping::joined : ObjGrouping::separate;
+}
+
+Instance makeInstance(int group, const Parameters& parameters) {
+  const Eigen::Affine3f placed(toWorld(parameters));
+  if (!placed.matrix().allFinite() || placed.linear().cast<double>().determinant() == 0)
+    throw ParameterError("to_world", "an instance's transform must be finite and not singular");
+  return {group, placed};
+}
+
+}  // namespace
+
+void ShapeReader::add(pugi::xml_node node) {
+  addTo(kTop, node);
+}
+
+void ShapeReader::addTo(int group, pugi::xml_node node) {
+  const std::string type = typeOf(context_, node);
+  if (std::ranges::find(kTypes, type) == kTypes.end()) {
+    context_.unsupported(
+        node, "shape " + type,
+        fmt::format("unknown shape type \"{}\"; {}", type, knownAre(type, fmt::format("{}", fmt::join(kTypes, ", ")))),
+        "the shape is left out");
+    return;
+  }
+  if (group != kTop && (type == "instance" || type == "shapegroup"))
+    context_.file.fail(node, fmt::format("{} inside a shapegroup: a group holds plain shapes only", describe(node)));
+  if (type == "instance")
+    addInstance(node);
+  else if (type == "shapegroup")
+    groupOf(node);
+  else
+    addShape(group, node, type);
+}
+
+void ShapeReader::addShape(int group, pugi::xml_node node, const std::string& type) {
+  Parts parts;
+  const auto onChild = [&](pugi::xml_node child, const std::string& name, Parameters&) {
+    return take(child, name, type, parts);
+  };
+  const Parameters parameters = readParameters(context_, node, "bsdf, ref, emitter", onChild);
+  if (group != kTop && parts.emitter) context_.file.fail(node, "a shape in a shapegroup cannot emit light");
+  const std::string id = node.attribute("id").value();
+  if (isMesh(type)) {
+    Mesh mesh = makeFrom(context_, node, parameters,
+                         [&](const Parameters& p) { return makeMesh(type, p, readOptions(type, p)); });
+    const std::string file = parameters.text("filename", "");
+    addMesh(group, node, std::move(mesh), id.empty() ? file : id, parts);
+    return;
+  }
+  Geometry geometry = makeFrom(context_, node, parameters,
+                               [&](const Parameters& p) { return makePrimitive(type, p, readOptions(type, p)); });
+  shapesOf(group).push_back({id.empty() ? type : id, std::move(geometry), materialOf(parts), parts.emitter});
+}
+
+int ShapeReader::materialOf(const Parts& parts) {
+  return parts.bsdf ? materials_.use(parts.bsdf) : materials_.useDefault(parts.emitter.has_value());
+}
+
+void ShapeReader::addInstance(pugi::xml_node node) {
+  std::optional<int> group;
+  const auto onChild = [&](pugi::xml_node child, const std::string&, Parameters&) {
+    if (elementName(child) != "shape") return false;
+    if (typeOf(context_, child) != "shapegroup" || group) context_.file.fail(node, "an instance needs one shapegroup");
+    group = groupOf(child);
+    return true;
+  };
+  const Parameters parameters = readParameters(context_, node, "ref", onChild);
+  if (!group) failUnlessIncomplete(context_, node, parameters, "an instance needs a <ref> to a shapegroup");
+  const std::string id = node.attribute("id").value();
+  Shape shape = makeFrom(context_, node, parameters, [&](const Parameters& p) {
+    return Shape{id.empty() ? "instance" : id, makeInstance(*group, p), -1, std::nullopt};
+  });
+  instances_.emplace_back(context_.scene.shapes.size(), SceneFile::location(node));
+  context_.scene.shapes.push_back(std::move(shape));
+}
+
+int ShapeReader::groupOf(pugi::xml_node node) {
+  const auto [entry, isNew] =
+      groups_.try_emplace(SceneFile::location(node), static_cast<int>(context_.scene.groups.size()));
+  if (isNew) {
+    context_.scene.groups.emplace_back();
+    readGroup(node, entry->second);
+  }
+  return entry->second;
+}
+
+void ShapeReader::readGroup(pugi::xml_node node, int group) {
+  const auto onChild = [&](pugi::xml_node child, const std::string&, Parameters&) {
+    if (elementName(child) != "shape") return false;
+    addTo(group, child);
+    return true;
+  };
+  const Parameters parameters = readParameters(context_, node, "shape", onChild);
+  checkUnused(context_, node, parameters);
+}
+
+bool ShapeReader::take(pugi::xml_node child, const std::string& name, const std::string& type, Parts& parts) {
+  const std::string_view tag = elementName(child);
+  if (tag == "bsdf") {
+    takeBsdf(child, name, type, parts);
+  } else if (tag == "emitter") {
+    takeEmitter(child, parts);
+  } else if (tag == "medium") {
+    rejectMedium(context_, child);
+  } else {
+    return false;
+  }
+  return true;
+}
+
+/// The name of an OBJ's bsdf is that of the material it is for; "bsdf" is what Mitsuba 3 calls the only one.
+void ShapeReader::takeBsdf(pugi::xml_node child, const std::string& name, const std::string& type, Parts& parts) {
+  if (type == "obj" && !name.empty() && name != "bsdf") {
+    parts.named.emplace_back(name, child);
+    return;
+  }
+  if (parts.bsdf) context_.file.fail(child, "a second bsdf for the same shape");
+  parts.bsdf = child;
+}
+
+void ShapeReader::takeEmitter(pugi::xml_node node, Parts& parts) {
+  const std::string type = typeOf(context_, node);
+  if (type != "area") {
+    context_.unsupported(node, "shape's emitter " + type,
+                         fmt::format("unknown emitter type \"{}\" in a shape; known is area", type),
+                         "the emitter is left out");
+    return;
+  }
+  if (parts.emitter) context_.file.fail(node, "a second emitter for the same shape");
+  const Parameters parameters = readParameters(
+      context_, node, "texture",
+      [this](pugi::xml_node child, const std::string& name, Parameters& p) { return textures_.take(child, name, p); });
+  parts.emitter = makeFrom(context_, node, parameters, [&](const Parameters& p) {
+    readSamplingWeight(context_, node, p);
+    return AreaEmitter{emissionTexture(p, "radiance", grey(1.0f))};
+  });
+}
+
+ShapeReader::Mesh ShapeReader::makeMesh(const std::string& type, const Parameters& parameters,
+                                        const MeshOptions& options) {
+  const std::filesystem::path path =
+      context_.file.resolve(requiredText(parameters, "filename"), parameters.location("filename"));
+  MeshSource source{type, path, 0, {}};
+  bool loadMaterials = false;
+  if (type == "serialized") source.index = readIndex(parameters, 0);
+  if (type == "obj") {
+    const bool isOfToday = context_.file.isOfToday();
+    source.obj = {{}, readIndex(parameters, -1), readGrouping(parameters, isOfToday)};
+    loadMaterials = parameters.flag("load_materials", !isOfToday);
+  }
+  return {{}, parameters.location("filename"), std::move(source), options, loadMaterials, ""};
+}
+
+void ShapeReader::addMesh(int group, pugi::xml_node node, Mesh mesh, const std::string& name, const Parts& parts) {
+  std::vector<Shape>& shapes = shapesOf(group);
+  const auto add = [&](const std::string& part, int material) {
+    mesh.shapes.push_back({group, shapes.size()});
+    shapes.push_back({part, TriangleMesh(), material, parts.emitter});
+  };
+  for (const auto& [material, bsdf] : parts.named) {
+    mesh.source.obj.materials.push_back(material);
+    add(fmt::format("{}:{}", name, material), materials_.use(bsdf));
+  }
+  if (mesh.loadMaterials && !parts.bsdf)
+    for (const auto& [material, index] : objMaterials_.read(node, mesh.location, mesh.source)) {
+      mesh.source.obj.materials.push_back(material);
+      add(fmt::format("{}:{}", name, material), index);
+    }
+  add(name, materialOf(parts));
+  meshes_.push_back(std::move(mesh));
+}
+
+void ShapeReader::readMeshes() {
+  parallelFor(std::size_t{0}, meshes_.size(), [this](std::size_t i) {
+    read(meshes_[i]);
+    if (context_.options.onProgress) context_.options.onProgress(1.0 / static_cast<double>(meshes_.size()));
+  });
+  for (const Mesh& mesh : meshes_) reportFault(mesh);
+  clearInstancesOutOfRange();
+  // From the back, as places are indices.
+  for (auto mesh = meshes_.rbegin(); mesh != meshes_.rend(); ++mesh) dropEmpty(*mesh);
+  std::erase_if(context_.scene.shapes, [](const Shape& shape) {
+    const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry);
+    return mesh && mesh->triangles.empty();
+  });
+}
+
+void ShapeReader::read(Mesh& mesh) {
+  try {
+    std::vector<TriangleMesh> parts = lobe::readMeshes(mesh.source, mesh.options);
+    for (std::size_t i = 0; i < parts.size(); ++i)
+      shapesOf(mesh.shapes[i].group)[mesh.shapes[i].index].geometry = std::move(parts[i]);
+  } catch (const std::exception& error) {
+    mesh.fault = error.what();
+  }
+}
+
+void ShapeReader::reportFault(const Mesh& mesh) {
+  if (mesh.fault.empty()) return;
+  const std::string message = fmt::format("shape \"{}\": {}", mesh.source.type, mesh.fault);
+  context_.unsupported(mesh.location, message, message, "the shape is left out");
+}
+
+/// Leaves nothing of them but their places, which are indices that others know; readMeshes drops these at its end.
+void ShapeReader::clearInstancesOutOfRange() {
+  for (const auto& [index, location] : instances_) {
+    const auto& instance = std::get<Instance>(context_.scene.shapes[index].geometry);
+    const ShapeGroup& group = context_.scene.groups[static_cast<std::size_t>(instance.group)];
+    const Eigen::AlignedBox3d box = boundsOf(group, instance.toWorld);
+    if (box.isEmpty() || (isInRange(box.min().cast<float>()) && isInRange(box.max().cast<float>()))) continue;
+    context_.unsupported(
+        location, fmt::format("instance at {}", location),
+        fmt::format("shape \"instance\": coordinates over {:g} in the world are not supported", kLargestCoordinate),
+        "the instance is left out");
+    context_.scene.shapes[index].geometry = TriangleMesh();
+  }
+}
+
+void ShapeReader::dropEmpty(const Mesh& mesh) {
+  for (std::size_t i = mesh.shapes.size(); i-- > 0;) {
+    std::vector<Shape>& shapes = shapesOf(mesh.shapes[i].group);
+    const auto shape = shapes.begin() + static_cast<std::ptrdiff_t>(mesh.shapes[i].index);
+    if (!std::get<TriangleMesh>(shape->geometry).triangles.empty()) continue;
+    if (mesh.fault.empty() && i < mesh.source.obj.materials.size())
+      context_.note(fmt::format("{}: no face is of material \"{}\"", mesh.source.path.filename().string(),
+                                mesh.source.obj.materials[i]));
+    shapes.erase(shape);
+  }
+}
+
+}  // namespace lobe

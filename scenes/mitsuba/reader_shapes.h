@@ -1,0 +1,72 @@
+#pragma once
+// Shape elements of scene files.
+
+#include <map>
+
+#include "scenes/meshes/mesh_options.h"
+#include "scenes/meshes/mesh_source.h"
+#include "scenes/mitsuba/reader_materials.h"
+#include "scenes/mitsuba/reader_obj_materials.h"
+
+namespace lobe {
+
+class ShapeReader {
+ public:
+  ShapeReader(ReadContext& context, TextureReader& textures, MaterialReader& materials)
+      : context_(context), textures_(textures), materials_(materials), objMaterials_(context, textures, materials) {}
+
+  /// Adds the shape to the scene; its mesh is left for readMeshes. Throws SceneError.
+  void add(pugi::xml_node node);
+  /// Reads the meshes of all shapes added, in parallel. SceneError: the fault of the first shape that has one.
+  void readMeshes();
+
+ private:
+  struct Parts {
+    pugi::xml_node bsdf;
+    std::vector<std::pair<std::string, pugi::xml_node>> named;  ///< of an OBJ's materials
+    std::optional<AreaEmitter> emitter;
+  };
+  /// Where a shape is kept: at the top of the scene (group −1) or in a group.
+  struct Place {
+    int group;
+    std::size_t index;
+  };
+  struct Mesh {
+    std::vector<Place> shapes;  ///< one for each of the source's materials, then that of the rest
+    std::ptrdiff_t location;
+    MeshSource source;
+    MeshOptions options;
+    bool loadMaterials;  ///< of an OBJ, from the library that it names
+    std::string fault;
+  };
+
+  void addTo(int group, pugi::xml_node node);
+  void addShape(int group, pugi::xml_node node, const std::string& type);
+  void addInstance(pugi::xml_node node);
+  int groupOf(pugi::xml_node node);
+  void readGroup(pugi::xml_node node, int group);
+  bool take(pugi::xml_node child, const std::string& name, const std::string& type, Parts& parts);
+  void takeBsdf(pugi::xml_node child, const std::string& name, const std::string& type, Parts& parts);
+  void takeEmitter(pugi::xml_node node, Parts& parts);
+  Mesh makeMesh(const std::string& type, const Parameters& parameters, const MeshOptions& options);
+  void addMesh(int group, pugi::xml_node node, Mesh mesh, const std::string& name, const Parts& parts);
+  int materialOf(const Parts& parts);
+  std::vector<Shape>& shapesOf(int group) {
+    return group < 0 ? context_.scene.shapes : context_.scene.groups[static_cast<std::size_t>(group)].shapes;
+  }
+  void read(Mesh& mesh);
+  void reportFault(const Mesh& mesh);
+  /// A fault where one shows its group too far away.
+  void clearInstancesOutOfRange();
+  void dropEmpty(const Mesh& mesh);
+
+  ReadContext& context_;
+  TextureReader& textures_;
+  MaterialReader& materials_;
+  ObjMaterialReader objMaterials_;
+  std::vector<Mesh> meshes_;
+  std::vector<std::pair<std::size_t, std::ptrdiff_t>> instances_;  // index into the scene's shapes, place in the file
+  std::map<std::ptrdiff_t, int> groups_;                           // by place in the file
+};
+
+}  // namespace lobe

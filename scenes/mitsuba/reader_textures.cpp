@@ -1,0 +1,167 @@
+#include "scenes/mitsuba/reader_textures.h"
+
+#include <algorithm>
+#include <cctype>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "materials/textures/bitmap.h"
+#include "materials/textures/checkerboard.h"
+#include "scenes/mitsuba/reader_colours.h"
+#include "scenes/mitsuba/reader_parameters.h"
+#include "scenes/mitsuba/values.h"
+
+namespace lobe {
+namespace {
+
+/// What takes the place of a texture that cannot be had.
+constexpr float kPlainGrey = 0.5f;
+
+/// Mitsuba 0.6's four numbers, or Mitsuba 3's transform in the plane.
+UvMap readUvMap(const Parameters& parameters) {
+  if (!parameters.has("to_uv")) {
+    const auto number = [&](const char* name, double fallback) {
+      return static_cast<float>(parameters.number(name, fallback));
+    };
+    return {Eigen::Matrix2f(Vec2(number("uscale", 1), number("vscale", 1)).asDiagonal()),
+            Vec2(number("uoffset", 0), number("voffset", 0))};
+  }
+  const Eigen::Matrix4d m = parameters.transform("to_uv");
+  // A matrix of 9 numbers has its translation in the third column, where (u, v) has its 1.
+  return {m.topLeftCorner<2, 2>().cast<float>(), (m.col(2) + m.col(3)).head<2>().cast<float>()};
+}
+
+Wrap parseWrap(const std::string& parameter, const std::string& mode) {
+  if (mode == "repeat") return Wrap::repeat;
+  if (mode == "mirror") return Wrap::mirror;
+  if (mode == "clamp") return Wrap::clamp;
+  if (mode == "zero" || mode == "black") return Wrap::zero;
+  if (mode == "one" || mode == "white") return Wrap::one;
+  throw ParameterError(parameter, fmt::format("unknown wrap mode \"{}\"; {}", mode,
+                                              knownAre(mode, "repeat, mirror, clamp, zero, one, black, white")));
+}
+
+bool readNearest(const Parameters& parameters) {
+  std::string filter = parameters.text("filter_type", "bilinear");
+  std::ranges::transform(filter, filter.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const bool prefilters = filter == "trilinear" || filter == "ewa";
+  if (filter != "nearest" && filter != "bilinear" && !prefilters)
+    throw ParameterError("filter_type",
+                         fmt::format("unknown filter \"{}\"; known are nearest, bilinear, trilinear, ewa", filter));
+  // Samples average over a pixel what these average beforehand.
+  if (prefilters) parameters.note(fmt::format("filter_type {} is taken for bilinear", filter));
+  return filter == "nearest";
+}
+
+BitmapOptions readBitmapOptions(const Parameters& parameters) {
+  BitmapOptions options;
+  const std::string both = parameters.text("wrap_mode", "repeat");
+  options.wrapU = parseWrap("wrap_mode", both);
+  options.wrapV = options.wrapU;
+  if (parameters.has("wrap_mode_u")) options.wrapU = parseWrap("wrap_mode_u", parameters.text("wrap_mode_u", ""));
+  if (parameters.has("wrap_mode_v")) options.wrapV = parseWrap("wrap_mode_v", parameters.text("wrap_mode_v", ""));
+  options.nearest = readNearest(parameters);
+  options.uvMap = readUvMap(parameters);
+  return options;
+}
+
+/// The image, or a grey one of the channel that is chosen. That of alpha has been read as such.
+std::shared_ptr<const Image> chosenChannel(const std::string& channel, std::shared_ptr<const Image> image) {
+  constexpr std::string_view kChannels = "rgb";
+  if (channel.empty() || channel == "a") return image;
+  const std::size_t index = channel.size() == 1 ? kChannels.find(channel) : std::string_view::npos;
+  if (index == std::string_view::npos && channel != "y")
+    throw ParameterError("channel", fmt::format("unknown channel \"{}\"; known are r, g, b, a, y", channel));
+  if (channel == "y" && !std::ranges::all_of(image->pixels, [](const Rgb& p) { return (p == p.x()).all(); }))
+    throw ParameterError("channel", "only grey images have a channel y; this one has r, g, b");
+  auto chosen = std::make_shared<Image>(*image);
+  if (index != std::string_view::npos)
+    for (Rgb& pixel : chosen->pixels) pixel = grey(pixel[static_cast<Eigen::Index>(index)]);
+  return chosen;
+}
+
+TexturePtr makeCheckerboardFrom(const ReadContext& context, const Parameters& parameters) {
+  const NumberSquares numbers = context.file.isOfToday() ? NumberSquares::exchanged : NumberSquares::asColours;
+  return makeCheckerboard(parameters.texture("color0", grey(0.4f)), parameters.texture("color1", grey(0.2f)),
+                          readUvMap(parameters), numbers);
+}
+
+TexturePtr makeScaled(const Parameters& parameters) {
+  return scaledTexture(parameters.onlyTexture(), parameters.colour("scale", grey(1.0f)));
+}
+
+constexpr int kMostParts = 1000;
+
+}  // namespace
+
+TexturePtr TextureReader::read(pugi::xml_node node, Encoded encoded) {
+  const auto [entry, isNew] = done_.try_emplace({SceneFile::location(node), encoded});
+  Made& done = entry->second;
+  if (isNew) {
+    const int outer = std::exchange(parts_, 1);
+    const auto make = [&] {
+      const Nesting nesting(context_, node, depth_);
+      done.texture = makeOf(node, encoded);
+    };
+    if (!context_.attempt("grey is used", make)) done.texture = constantTexture(grey(kPlainGrey));
+    done.parts = std::exchange(parts_, outer);
+  } else if (!done.texture) {
+    context_.unsupported(node, fmt::format("circle at {}", SceneFile::location(node)),
+                         "a texture that refers to itself", "grey is used in it");
+    return constantTexture(grey(kPlainGrey));
+  }
+  parts_ += done.parts;
+  return done.texture;
+}
+
+bool TextureReader::take(pugi::xml_node child, const std::string& name, Parameters& parameters, Encoded encoded) {
+  if (elementName(child) != "texture") return false;
+  const std::string key = name.empty() ? "texture" : normalisedName(name);
+  if (parameters.contains(key)) warnOfRepetition(context_, child, key);
+  parameters.set(key, read(child, encoded), SceneFile::location(child));
+  return true;
+}
+
+TexturePtr TextureReader::readFile(pugi::xml_node node, std::ptrdiff_t location, const std::filesystem::path& path,
+                                   Encoded encoded) {
+  Parameters parameters;
+  parameters.set("filename", path.string(), location);
+  parameters.set("raw", encoded != Encoded::asGiven);
+  return makeFromBitmap(node, parameters, encoded);
+}
+
+TexturePtr TextureReader::makeOf(pugi::xml_node node, Encoded encoded) {
+  const std::string type = typeOf(context_, node);
+  if (type != "bitmap" && type != "checkerboard" && type != "scale" && !isSpectrum(type)) {
+    context_.unsupported(node, "texture " + type,
+                         fmt::format("unknown texture type \"{}\"; {}", type,
+                                     knownAre(type, "bitmap, checkerboard, scale, " + knownSpectra())),
+                         "grey is used");
+    return constantTexture(grey(kPlainGrey));
+  }
+  Parameters parameters = readParameters(
+      context_, node, "texture",
+      [&](pugi::xml_node child, const std::string& name, Parameters& p) { return take(child, name, p, encoded); });
+  // Their means and bounds are found by looking at all of them.
+  if (parts_ > kMostParts)
+    context_.file.fail(node, fmt::format("{}: more than {} textures nested in one", describe(node), kMostParts));
+  if (type == "bitmap" && encoded == Encoded::linear) parameters.set("raw", true, parameters.location("raw"));
+  return makeFrom(context_, node, parameters, [&](const Parameters& p) {
+    if (isSpectrum(type)) return makeSpectrum(context_, node, type, p);
+    if (type == "checkerboard") return makeCheckerboardFrom(context_, p);
+    return type == "scale" ? makeScaled(p) : makeFromBitmap(node, p, encoded);
+  });
+}
+
+TexturePtr TextureReader::makeFromBitmap(pugi::xml_node node, const Parameters& parameters, Encoded encoded) {
+  const BitmapOptions options = readBitmapOptions(parameters);
+  const ImageRequest request = bitmapRequest(context_, parameters);
+  std::shared_ptr<const Image> image = images_.get(context_, node, parameters, request, "grey is used");
+  if (!image) return constantTexture(grey(kPlainGrey));
+  const Sign sign = encoded == Encoded::asGiven ? Sign::positive : Sign::any;
+  image = withoutFaults(context_, node, request, std::move(image), sign);
+  return makeBitmap(chosenChannel(channelOf(parameters), std::move(image)), options);
+}
+
+}  // namespace lobe

@@ -1,0 +1,66 @@
+#include <cmath>
+#include <filesystem>
+
+#include <catch2/catch.hpp>
+
+#include "runtime/core/colour.h"
+#include "runtime/core/files.h"
+#include "runtime/core/numbers.h"
+#include "runtime/core/statistics.h"
+
+namespace lobe {
+namespace {
+
+TEST_CASE("core: numbers are read whole or not at all") {
+  CHECK(parseReal("+1.5e3") == 1500.0);
+  CHECK(parseReal("-.25") == -0.25);
+  CHECK(!parseReal(""));
+  CHECK(!parseReal("1x"));
+  CHECK(!parseReal(" 1"));
+  CHECK(parseNumber(" 1\r\n") == 1.0);
+  CHECK(!parseNumber("inf"));
+  CHECK(parseInteger("7") == 7);
+  CHECK(!parseInteger("7.5"));
+  CHECK(parseNumbers("1, 2 3") == std::vector<double>{1, 2, 3});
+  CHECK(!parseNumbers("1,"));
+}
+
+TEST_CASE("core: numbers out of range become zero or infinite") {
+  CHECK(parseReal("1e-400") == 0.0);
+  CHECK(parseReal("1e400") == INFINITY);
+  CHECK(parseReal("-1E400") == -INFINITY);
+  CHECK(!parseNumber("1e400"));
+}
+
+TEST_CASE("core: the sRGB transfer function and its inverse agree") {
+  for (float x = 0; x <= 1; x += 1 / 64.0f) CHECK(decodeSrgb(encodeSrgb(x)) == Approx(x).margin(1e-5));
+  CHECK(encodeSrgb(0.5f) == Approx(0.735357).epsilon(1e-5));  // IEC 61966-2-1
+  CHECK(encodeSrgb(-1) == 0);
+  CHECK(encodeSrgb(NAN) == 0);
+  CHECK(encodeSrgb(2) == Approx(1));
+}
+
+TEST_CASE("core: quantiles interpolate between the nearest values") {
+  CHECK(median({3, 1, 2}) == 2);
+  CHECK(median({4, 1, 3, 2}) == 2.5);
+  CHECK(quantile({0, 10}, 0.9) == Approx(9));
+  CHECK(quantile({5}, 1) == 5);
+  CHECK(std::isnan(median({})));
+}
+
+TEST_CASE("core: what is not a regular file is refused by name") {
+  const auto message = [](const std::filesystem::path& path) -> std::string {
+    try {
+      nameErrors(path, [&] { return readFile(path); });
+    } catch (const std::runtime_error& e) {
+      return e.what();
+    }
+    return {};
+  };
+  CHECK(message("/no/such/file") == "/no/such/file: no such file");
+  CHECK(message("/") == "/: is a folder, not a file");
+  CHECK(message("/dev/null") == "/dev/null: is not a regular file");
+}
+
+}  // namespace
+}  // namespace lobe

@@ -1,0 +1,284 @@
+#include <algorithm>
+#include <array>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <filesystem>
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+#include <tbb/task.h>
+#include <nlohmann/json.hpp>
+
+#include "fitter/compile.h"
+#include "runtime/core/atomic_file.h"
+#include "runtime/core/parallel.h"
+#include "runtime/tools/cache_report.h"
+#include "runtime/tools/tool.h"
+#include "scenes/scene_lobes.h"
+#include "tests/support/fitter_test_lobes.h"
+#include "tests/support/tool_run.h"
+
+using namespace lobe;
+using namespace lobe::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+Scene sceneOf(const std::vector<std::pair<std::string, BsdfPtr>>& materials) {
+  Scene scene;
+  for (const auto& [name, bsdf] : materials) scene.materials.push_back({name, bsdf});
+  return scene;
+}
+
+CompileOptions quickOptions(const fs::path& folder) {
+  CompileOptions options;
+  options.directory = folder / "caches";
+  options.elevations = 6;
+  options.directions = 12;
+  options.settings.samples = 512;
+  return options;
+}
+
+void runAll(const std::vector<CompileJob>& jobs) {
+  for (const CompileJob& job : jobs)
+    if (!job.upToDate) runCompile(job, [] {});
+}
+
+}  // namespace
+
+TEST_CASE("fitter: equal lobes are fitted once, whatever the material") {
+  const Scene scene = sceneOf({{"red", roughConductor(0.2, 0.2)},
+                               {"rough", roughConductor(0.3, 0.3)},
+                               {"blue", roughConductor(0.2, 0.2)},
+                               {"plain", makeBsdf("diffuse", {})}});
+  const std::vector<LobeUse> uses = collectLobes(scene);
+  REQUIRE(uses.size() == 2);
+  CHECK(uses[0].materials == std::vector<std::string>{"red", "blue"});
+  CHECK(uses[1].materials == std::vector<std::string>{"rough"});
+  CHECK(abbreviated(uses[0].materials) == "red + 1 more");
+}
+
+TEST_CASE("fitter: what is up to date is left alone, what is not says why") {
+  const Folder folder;
+  const std::vector<LobeUse> uses =
+      collectLobes(sceneOf({{"iso", roughConductor(0.3, 0.3)}, {"aniso", roughConductor(0.1, 0.3)}}));
+  CompileOptions options = quickOptions(folder.path());
+  std::vector<CompileJob> jobs = planCompile(uses, options);
+  REQUIRE(jobs.size() == 2);
+  CHECK((jobs[0].grid.kind == GridKind::elevation && jobs[1].grid.kind == GridKind::fibonacci));
+  CHECK((!jobs[0].upToDate && jobs[0].stale.empty()));
+  runAll(jobs);
+  for (const CompileJob& job : planCompile(uses, options)) CHECK(job.upToDate);
+
+  options.force = true;
+  CHECK(!planCompile(uses, options)[0].upToDate);
+  options.force = false;
+  options.settings.components = 4;
+  CHECK(planCompile(uses, options)[0].stale == "other fit settings");
+  options = quickOptions(folder.path());
+  options.elevations = 7;
+  jobs = planCompile(uses, options);
+  CHECK(jobs[0].stale == "another grid of directions");
+  CHECK(jobs[1].upToDate);
+  fs::resize_file(jobs[1].path, 100);
+  CHECK_THAT(planCompile(uses, options)[1].stale, Catch::Contains("truncated"));
+}
+
+TEST_CASE("fitter: the same bytes from any number of threads") {
+  const Folder folder;
+  const std::vector<LobeUse> uses =
+      collectLobes(sceneOf({{"iso", roughConductor(0.3, 0.3)}, {"aniso", roughConductor(0.1, 0.3)}}));
+  std::array<std::vector<std::string>, 2> contents;
+  for (const std::size_t threads : {1u, 2u}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    CompileOptions options = quickOptions(folder.path());
+    options.directory = folder / std::to_string(threads);
+    const std::vector<CompileJob> jobs = planCompile(uses, options);
+    runAll(jobs);
+    for (const CompileJob& job : jobs) contents[threads - 1].push_back(readFile(job.path));
+  }
+  CHECK(contents[0] == contents[1]);
+  CHECK(contents[0][0].size() > 500);
+}
+
+TEST_CASE("fitter: the summary of a cache is that of its records") {
+  const Folder folder;
+  LobeCacheInfo info;
+  info.model = info.key = info.summary = info.toolVersion = "x";
+  info.gridCount = 3;
+  const CacheComponent c{1, 0, 0, 0.1f, 0, 0.1f};
+  const CacheComponent half{0.5f, 0, 0, 0.1f, 0, 0.1f};
+  const std::vector<CacheRecord> records{{0, 0, 1, 1, 1, 0.5f, 0.1f, 0.3f, 0.4f, 2.0f},
+                                         {1, 1, 2, 1, 1, 0.5f, 0.3f, 0.1f, 0.6f, 5.0f},
+                                         {2, 0, 1, 1, 1, 0.5f, 0.2f, 0.2f, 0.5f, 3.0f}};
+  writeAtomically(folder / "x.lobe",
+                  encodeLobeCache(info, records, std::vector{c, half, half}, std::vector<std::uint32_t>{0, 1, 2}));
+  const CacheSummary s = summarise(LobeCache::open(folder / "x.lobe"));
+  CHECK(s.records == 3);
+  CHECK(s.meanComponents == Approx(4.0 / 3));
+  CHECK(s.nevMedian == Approx(0.2));
+  CHECK(s.nevWorst == Approx(0.3));
+  CHECK(s.coverageMedian == Approx(0.5));
+  CHECK(s.coverageWorst == Approx(0.6));
+  CHECK(s.worstRatio == Approx(5));
+  CHECK(s.outside == Approx(0.2));
+}
+
+TEST_CASE("fitter: options out of range are named") {
+  const auto fault = [](const std::function<void(CompileOptions&)>& change) {
+    CompileOptions options;
+    change(options);
+    try {
+      options.validate();
+    } catch (const std::runtime_error& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  CHECK(fault([](CompileOptions&) {}).empty());
+  CHECK_THAT(fault([](CompileOptions& o) { o.settings.components = 0; }), Catch::Contains("--components"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.settings.components = 33; }), Catch::Contains("--components"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.settings.samples = 3; }), Catch::Contains("--samples"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.settings.reduction = -1; }), Catch::Contains("--reduction"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.settings.reduction = std::nanf(""); }), Catch::Contains("--reduction"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.elevations = 0; }), Catch::Contains("--elevations"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.directions = -5; }), Catch::Contains("--directions"));
+  CHECK_THAT(fault([](CompileOptions& o) { o.directory = ""; }), Catch::Contains("--output"));
+}
+
+namespace {
+
+const char* const kTwoMaterials = R"(<scene version="0.6.0">
+  <bsdf type="roughconductor" id="Steel"><string name="distribution" value="ggx"/>
+    <float name="alpha" value="$roughness"/></bsdf>
+  <bsdf type="roughconductor" id="Again"><string name="distribution" value="ggx"/>
+    <float name="alpha" value="0.3"/></bsdf>
+  <shape type="sphere"><ref id="Steel"/></shape>
+  <shape type="sphere"><ref id="Again"/></shape>
+  <shape type="sphere"><bsdf type="diffuse"/></shape>
+</scene>)";
+
+}  // namespace
+
+TEST_CASE("fitter: lobefit compiles a scene, then has nothing to do; lobedump shows what it made") {
+  const Folder folder;
+  writeAtomically(folder / "scene.xml", std::string(kTwoMaterials));
+  const std::string fit = "lobefit scene.xml -D roughness=0.3 --elevations 4 --samples 256";
+  ToolRun r = runBinary(folder.path(), fit + " --json");
+  CHECK(r.code == 0);
+  CHECK_THAT(r.error, Catch::Contains("1 of 1 lobes written to lobes"));
+  const auto json = nlohmann::json::parse(r.out);
+  REQUIRE(json.size() == 1);
+  CHECK(json[0]["materials"] == nlohmann::json({"Steel", "Again"}));
+  CHECK(json[0]["records"] == 4);
+  r = runBinary(folder.path(), fit);
+  CHECK(r.code == 0);
+  CHECK_THAT(r.error, Catch::Contains("nothing to do"));
+  CHECK_THAT(r.out, Catch::Contains("Steel + 1 more") && Catch::Contains("up to date"));
+
+  r = runBinary(folder.path(), "lobedump lobes/*.lobe --records");
+  CHECK(r.code == 0);
+  CHECK(lineCount(r.out) == 6 + 5 + 1 + 2);  // header, records, gap, table
+  r = runBinary(folder.path(), "lobedump --json lobes/*.lobe");
+  CHECK(nlohmann::json::parse(r.out)[0]["records"].size() == 4);
+}
+
+TEST_CASE("fitter: a lobe that fails leaves the others whole, not half fitted") {
+  const Folder folder;
+  std::string scene = "<scene version=\"3.0.0\">";
+  for (int i = 0; i < 6; ++i)
+    scene += fmt::format(R"(<shape type="sphere"><bsdf type="roughconductor"><string name="distribution" value="ggx"/>
+                            <float name="alpha" value="{}"/></bsdf></shape>)",
+                         0.1 + 0.05 * i);
+  writeAtomically(folder / "scene.xml", scene + "</scene>");
+  const std::string fit = "lobefit scene.xml --method wem --elevations 48 --samples 1024 -o ";
+  REQUIRE(runBinary(folder.path(), fit + "clean").code == 0);
+  std::vector<fs::path> names;
+  for (const auto& entry : fs::directory_iterator(folder / "clean")) names.push_back(entry.path().filename());
+  REQUIRE(names.size() == 6);
+  // A folder where one cache should be: its lobe fails while the others are being fitted.
+  for (const fs::path& obstacle : names) {
+    fs::remove_all(folder / "b");
+    fs::create_directories(folder / "b" / obstacle);
+    const ToolRun r = runBinary(folder.path(), fit + "b");
+    CHECK(r.code == 1);
+    CHECK_THAT(r.error, Catch::Contains(obstacle.string()) && Catch::Contains("the other 5 lobes are written"));
+    fs::remove(folder / "b" / obstacle);
+    CHECK(runBinary(folder.path(), fit + "b").code == 0);
+    for (const fs::path& name : names) CHECK(readFile(folder / "b" / name) == readFile(folder / "clean" / name));
+  }
+}
+
+TEST_CASE("fitter: a fit that is cancelled from outside throws instead of returning a part") {
+  const BsdfPtr bsdf = roughConductor(0.3, 0.3);
+  CompileOptions options;
+  const CompileJob job = planCompile(collectLobes(sceneOf({{"a", bsdf}})), options).front();
+  for (const bool fixedGrid : {true, false}) {
+    FitSettings settings = job.info.settings;
+    settings.fixedGrid = fixedGrid;
+    bool returned = false;
+    const auto fitBesideFailure = [&] {
+      parallelFor(0, 1, [&](int) {
+        // The enclosing loop is cancelled at the first direction that is fitted.
+        tbb::task_group_context* enclosing = tbb::task::current_context();
+        fitGrid(*job.use.lobe, job.grid, settings, [enclosing] { enclosing->cancel_group_execution(); });
+        returned = true;
+      });
+    };
+    CHECK_THROWS_AS(fitBesideFailure(), LoopCancelled);
+    CHECK(!returned);
+  }
+}
+
+TEST_CASE("fitter: tools refuse bad input with one line") {
+  const Folder folder;
+  writeAtomically(folder / "scene.xml", std::string(kTwoMaterials));
+  writeAtomically(folder / "broken.xml", std::string("<scene><bsdf type='diffuse'></scene>"));
+  writeAtomically(folder / "no.lobe", std::string("something else"));
+  writeAtomically(folder / "empty.lobe", std::string());
+  const std::pair<const char*, int> cases[] = {{"lobefit", 2},
+                                               {"lobefit scene.xml --components 0 -D roughness=1", 2},
+                                               {"lobefit scene.xml --samples many", 2},
+                                               {"lobefit scene.xml --threads 0", 2},
+                                               {"lobefit scene.xml -D roughness", 2},
+                                               {"lobefit scene.xml --plot", 2},
+                                               {"lobefit scene.xml -D roughness=1 --reduction 0.1", 2},
+                                               {"lobefit scene.xml -D roughness=1 --method wem --quality 0.1", 2},
+                                               {"lobefit scene.xml", 1},  // $roughness is not defined
+                                               {"lobefit missing.xml", 1},
+                                               {"lobefit broken.xml", 1},
+                                               {"lobefit scene.xml -D roughness=0.3 -o scene.xml/x", 1},
+                                               {"lobedump", 2},
+                                               {"lobedump missing.lobe", 1},
+                                               {"lobedump no.lobe", 1},
+                                               {"lobedump empty.lobe", 1},
+                                               {"lobedump .", 1}};
+  for (const auto& [arguments, code] : cases) {
+    const ToolRun r = runBinary(folder.path(), arguments);
+    CAPTURE(arguments, r.error);
+    CHECK(r.code == code);
+    CHECK(lineCount(r.error) == 1);
+    CHECK_THAT(r.error, Catch::Contains(": error: "));
+    CHECK(r.out.empty());
+  }
+  CHECK(!fs::exists(folder / "lobes"));
+}
+
+TEST_CASE("fitter: tools end with the exit code that fits and say why in one line") {
+  const auto run = [](std::vector<std::string> arguments, const std::function<void()>& work) {
+    std::vector<char*> argv;
+    argv.reserve(arguments.size());
+    for (std::string& a : arguments) argv.push_back(a.data());
+    int number = 0;
+    return runTool(
+        "tool", "A tool.", static_cast<int>(argv.size()), argv.data(),
+        [&](CLI::App& app) { app.add_option("--number", number, "A number"); }, work);
+  };
+  const auto nothing = [] {};
+  CHECK(run({"tool"}, nothing) == 0);
+  CHECK(run({"tool", "--number", "3"}, nothing) == 0);
+  CHECK(run({"tool", "--number", "x"}, nothing) == 2);
+  CHECK(run({"tool", "--unknown"}, nothing) == 2);
+  CHECK(run({"tool"}, [] { throw UsageError("no"); }) == 2);
+  CHECK(run({"tool"}, [] { throw std::runtime_error("failed"); }) == 1);
+}

@@ -1,0 +1,169 @@
+// The public interface of the guiding library: what a host tells and asks.
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "lobe/field.h"
+#include "lobe/path_recorder.h"
+#include "lobe/surface_distribution.h"
+#include "runtime/core/random.h"
+#include "runtime/guiding/sample_storage_data.h"
+#include "tests/support/tool_run.h"
+
+using namespace lobe;
+
+namespace {
+
+constexpr float kPi = 3.14159265f;
+
+FieldOptions smallField() {
+  FieldOptions options;
+  options.sceneDiagonal = 10;
+  options.unitFraction = 0.1f;
+  return options;
+}
+
+/// A photon somewhere on the unit square of the floor z = 0, from about the direction (0.6, 0, 0.8), and a request
+/// there.
+void addPath(SampleStorage& storage, std::uint64_t index) {
+  Rng rng(5, 0, index);
+  const Float3 position{rng.uniform(), rng.uniform(), 0};
+  const Vec3 direction = Vec3(0.6f + 0.1f * rng.uniform(), 0.1f * rng.uniform(), 0.8f).normalized();
+  storage.beginPath(index);
+  storage.addPhoton(position, {0, 0, 1}, {direction.x(), direction.y(), direction.z()}, 0.5f + rng.uniform(), 3, 1);
+  storage.requestRecord(position, {0, 0, 1});
+}
+
+SampleStorage paths(const std::vector<int>& indices) {
+  SampleStorage storage;
+  for (const int i : indices) addPath(storage, static_cast<std::uint64_t>(i));
+  return storage;
+}
+
+Field trained() {
+  std::vector<int> all(2000);
+  for (int i = 0; i < 2000; ++i) all[static_cast<std::size_t>(i)] = i;
+  Field field(smallField());
+  field.update(paths(all));
+  return field;
+}
+
+ShadingPoint floorAt(float x, float y) {
+  return {{x, y, 0}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, 1}};
+}
+
+}  // namespace
+
+TEST_CASE("guiding: a field does not depend on which thread traced which path") {
+  std::vector<int> even, odd;
+  for (int i = 0; i < 1000; ++i) (i % 2 == 0 ? even : odd).push_back(i);
+  const test::Folder folder;
+  for (const bool evenFirst : {true, false}) {
+    SampleStorage a = paths(evenFirst ? even : odd), b = paths(evenFirst ? odd : even);
+    a.merge(std::move(b));
+    CHECK(a.particles() == 1000);
+    Field field(smallField());
+    field.update(a);
+    REQUIRE(field.records() > 3);
+    field.save(folder / (evenFirst ? "a.illum" : "b.illum"));
+  }
+  CHECK(test::readFile(folder / "a.illum") == test::readFile(folder / "b.illum"));
+}
+
+TEST_CASE("guiding: a field that was loaded is the one that was saved, and is not trained further") {
+  const test::Folder folder;
+  const Field field = trained();
+  field.save(folder / "a.illum");
+  Field loaded = Field::load(folder / "a.illum");
+  CHECK(loaded.records() == field.records());
+  loaded.save(folder / "b.illum");
+  CHECK(test::readFile(folder / "a.illum") == test::readFile(folder / "b.illum"));
+  CHECK_THROWS_AS(loaded.update(paths({1, 2})), std::logic_error);
+  CHECK_THROWS_WITH(Field::load(folder / "none.illum"), Catch::Contains("none.illum"));
+  FieldOptions options;
+  options.components = 9;
+  CHECK_THROWS_WITH(Field(options), Catch::Contains("components"));
+}
+
+TEST_CASE("guiding: without a record all directions are the BSDF's") {
+  const Field field = trained();
+  const SurfaceDistribution nowhere(field, floorAt(100, 100));
+  CHECK(!nowhere.hasRecord());
+  CHECK(nowhere.decision() == GuidingDecision::noRecord);
+  CHECK(nowhere.bsdfProbability() == 1);
+  CHECK(nowhere.guidedPdf({0, 0, 1}) == 0);
+  float choice = 0.7f;
+  CHECK(nowhere.choose(choice) == Strategy::bsdf);
+  CHECK(choice == 0.7f);
+  CHECK(!nowhere.reflectedRadiance(1));
+}
+
+TEST_CASE("guiding: the distribution at a surface has a density of one, and samples where the light is") {
+  const Field field = trained();
+  SurfaceDistribution guide(field, floorAt(0.5f, 0.5f));
+  REQUIRE(guide.hasRecord());
+  guide.describe({.lobes = {}, .diffuseAlbedo = 0.5f}, nullptr);
+  CHECK(guide.decision() == GuidingDecision::illumination);
+  constexpr int kRings = 400;
+  double mass = guide.bsdfProbability();
+  for (int i = 0; i < kRings; ++i)
+    for (int j = 0; j < 4 * kRings; ++j) {
+      const float z = (static_cast<float>(i) + 0.5f) / kRings,
+                  phi = 2 * kPi * (static_cast<float>(j) + 0.5f) / (4 * kRings);
+      const float r = std::sqrt(1 - z * z);
+      mass += guide.guidedPdf({r * std::cos(phi), r * std::sin(phi), z}) * 2 * kPi / (4.0 * kRings * kRings);
+    }
+  CHECK(mass == Approx(1).epsilon(0.01));
+  Rng rng(1);
+  int guided = 0, towards = 0;
+  for (int i = 0; i < 2000; ++i) {
+    float choice = rng.uniform();
+    const Strategy strategy = guide.choose(choice);
+    if (strategy == Strategy::bsdf) continue;
+    const auto sample = guide.sample(strategy, choice, {rng.uniform(), rng.uniform()});
+    if (!sample) continue;
+    ++guided;
+    CHECK(sample->guidedPdf == Approx(guide.guidedPdf(sample->wi)).epsilon(1e-3));
+    if (sample->wi.x * 0.63f + sample->wi.z * 0.78f > 0.95f) ++towards;
+  }
+  CHECK(guided == Approx(1000).margin(120));
+  CHECK(towards > 0.9 * guided);
+}
+
+TEST_CASE("guiding: a recorded path tells each vertex the light that arrived there") {
+  SampleStorage storage;
+  PathRecorder recorder(storage);
+  recorder.begin(3);
+  const float h = std::sqrt(0.5f);
+  // The throughput behind the first vertex is 0.5, behind the second 0.1; the second looks at light of 8 and then of 2.
+  recorder.addVertex({.position = {0, 0, 0},
+                      .normal = {0, 0, -1},
+                      .direction = {h, 0, h},
+                      .wi = {h, 0, h},
+                      .pdf = 0.25f,
+                      .weight = {0.5f, 0.5f, 0.5f},
+                      .throughput = {0.5f, 0.5f, 0.5f}},
+                     nullptr);
+  recorder.setDistance(2);
+  recorder.addLight({1, 1, 1});
+  recorder.addVertex({.position = {1, 0, 1},
+                      .normal = {0, 0, 1},
+                      .direction = {0, 0, 1},
+                      .wi = {0, 0, 1},
+                      .pdf = 0.5f,
+                      .weight = {0.2f, 0.2f, 0.2f},
+                      .throughput = {0.1f, 0.1f, 0.1f}},
+                     nullptr);
+  recorder.addLight({0.8f, 0.8f, 0.8f});
+  recorder.end();
+  const std::vector<Particle>& samples = dataOf(storage).samples;
+  REQUIRE(samples.size() == 2);
+  CHECK(samples[0].weight == Approx(h / 0.25f * (1 / 0.5f + 0.8f / 0.5f)));
+  CHECK(samples[0].normal.z() == 1);  // on the side of the direction
+  CHECK(samples[0].distance == 2);
+  CHECK(samples[1].weight == Approx(1 / 0.5f * 8));
+  CHECK(samples[1].distance == std::numeric_limits<float>::infinity());
+}

@@ -1,0 +1,146 @@
+// Film, errors and image files.
+
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <sstream>
+
+#include "runtime/image/error_map.h"
+#include "runtime/image/error_metrics.h"
+#include "runtime/image/image_output.h"
+#include "runtime/render/film/film.h"
+#include "tests/support/render_test_tools.h"
+
+using namespace lobe;
+using namespace lobe::test;
+
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+std::string bytesOf(const std::filesystem::path& path) {
+  std::ostringstream text;
+  text << std::ifstream(path, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+Image gradient(int width, int height) {
+  Image image(width, height);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) image.at(x, y) = Rgb(x / 7.0f, y / 5.0f, 1e-3f * x * y);
+  return image;
+}
+
+}  // namespace
+
+TEST_CASE("render: a film drops and counts what is no radiance") {
+  Film film(2, 1);
+  film.add(0, 0, {1, 2, 3});
+  film.add(0, 0, {kNan, 0, 0});
+  film.add(0, 0, {0, kInfinity, 0});
+  film.add(0, 0, {0, 0, -1e-9f});
+  film.add(0, 0, {3, 2, 1});
+  CHECK(film.dropped() == 3);
+  const Image mean = film.mean();
+  CHECK((mean.at(0, 0) - Rgb(2, 2, 2)).abs().maxCoeff() < 1e-7f);
+  CHECK(mean.at(1, 0).isZero());
+  const Image variance = film.varianceOfMean();
+  CHECK((variance.at(0, 0) - Rgb(1, 0, 1)).abs().maxCoeff() < 1e-7f);
+  CHECK(std::isinf(variance.at(1, 0).x()));
+}
+
+TEST_CASE("render: errors of images made by hand") {
+  Image reference(10, 10, grey(0.5f));
+  SECTION("equal") {
+    const ErrorMetrics m = compareImages(reference, reference);
+    CHECK(m.mse == 0);
+    CHECK(m.relmse == 0);
+    CHECK(m.meanRatio == 1);
+    CHECK(m.nonfinite == 0);
+  }
+  SECTION("brighter by a tenth") {
+    const ErrorMetrics m = compareImages(reference, Image(10, 10, grey(0.6f)));
+    CHECK(m.mse == Approx(0.01));
+    CHECK(m.relmse == Approx(0.01 / 0.26));
+    CHECK(m.relmseDrop1 == Approx(0.01 / 0.26));
+    CHECK(m.meanRatio == Approx(1.2));
+  }
+  SECTION("one bad pixel in a hundred") {
+    Image image = reference;
+    image.at(3, 4).x() = 3.5f;
+    const ErrorMetrics m = compareImages(reference, image);
+    CHECK(m.mse == Approx(9.0 / 300));
+    CHECK(m.relmse == Approx(9.0 / 0.26 / 300));
+    CHECK(m.relmseDrop01 == Approx(m.relmse));  // a thousandth of a hundred pixels is none
+    CHECK(m.relmseDrop1 == 0);
+  }
+  SECTION("not finite") {
+    Image image = reference;
+    image.at(0, 0).y() = kNan;
+    image.at(1, 0).z() = kInfinity;
+    image.at(2, 0) = grey(0.7f);
+    const ErrorMetrics m = compareImages(reference, image);
+    CHECK(m.nonfinite == 2);
+    CHECK(m.mse == Approx(0.04 / 98));
+    CHECK(m.meanRatio == Approx((97 * 0.5 + 0.7) / (98 * 0.5)));
+    CHECK(std::isnan(relativeErrors(reference, image)[0]));
+  }
+  SECTION("black reference") {
+    CHECK(std::isnan(compareImages(Image(2, 2), Image(2, 2)).meanRatio));
+  }
+  SECTION("sizes") {
+    CHECK_THROWS_WITH(compareImages(reference, Image(10, 9)), "the image has 10x9 pixels, the reference 10x10");
+    CHECK_THROWS(compareImages(Image(), Image()));
+  }
+}
+
+TEST_CASE("render: worst pixels are left out by share") {
+  Image reference(100, 20, grey(0.0f)), image = reference;
+  for (int i = 0; i < 20; ++i) image.pixels[i * 97] = grey(i < 2 ? 10.0f : 1.0f);
+  const ErrorMetrics m = compareImages(reference, image);
+  CHECK(m.relmse == Approx((2 * 1e4 + 18 * 100) / 2000));
+  CHECK(m.relmseDrop01 == Approx(18 * 100.0 / 1998));
+  CHECK(m.relmseDrop1 == 0);
+}
+
+TEST_CASE("render: images come back from files") {
+  const Folder folder;
+  const Image image = gradient(13, 7);
+  SECTION("exr keeps the floats") {
+    writeImage(folder / "a.exr", image, {{"seed", 4.0}, {"integrator", "path"}});
+    const Image back = readImage(folder / "a.exr");
+    REQUIRE(back.width == 13);
+    REQUIRE(back.height == 7);
+    for (std::size_t i = 0; i < image.pixels.size(); ++i) CHECK((back.pixels[i] == image.pixels[i]).all());
+    const std::string bytes = bytesOf(folder / "a.exr");
+    CHECK(bytes.find("integrator") != std::string::npos);
+    writeImage(folder / "b.exr", image, {{"seed", 4.0}, {"integrator", "path"}});
+    CHECK(bytes == bytesOf(folder / "b.exr"));
+  }
+  SECTION("png is sRGB") {
+    writeImage(folder / "a.PNG", image);
+    const Image back = readImage(folder / "a.PNG");
+    REQUIRE(back.width == 13);
+    for (std::size_t i = 0; i < image.pixels.size(); ++i)
+      CHECK((back.pixels[i] - image.pixels[i].min(1.0f)).abs().maxCoeff() < 0.01f);
+  }
+  SECTION("other endings are refused") {
+    CHECK_THROWS_WITH(writeImage(folder / "a.jpg", image), Catch::Contains("a.jpg") && Catch::Contains(".exr or .png"));
+    CHECK_THROWS_WITH(writeImage(folder / "missing" / "a.exr", image), Catch::Contains("a.exr"));
+  }
+  CHECK(folder.files() <= 2);  // nothing temporary is left
+}
+
+TEST_CASE("render: errors have colours") {
+  CHECK(errorColour(0).isZero());
+  CHECK((errorColour(1e9f) - Rgb::Ones()).abs().maxCoeff() < 1e-6f);
+  CHECK(errorColour(kNan).z() == 1);
+  float previous = -1;
+  for (float e = kMapLow; e <= kMapHigh; e *= 1.5f) {
+    CHECK(errorColour(e).x() >= previous);
+    previous = errorColour(e).x();
+  }
+  const Folder folder;
+  writeErrorMap(folder / "map.png", Image(4, 3, grey(1)), Image(4, 3, grey(2)));
+  CHECK(readImage(folder / "map.png").width == 4);
+}

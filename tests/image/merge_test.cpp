@@ -1,0 +1,140 @@
+// Pictures made in parts: the mean by samples, what is kept of their attributes, and what is refused.
+
+#include <fmt/format.h>
+
+#include "runtime/image/merge.h"
+#include "tests/support/render_test_tools.h"
+
+using namespace lobe;
+using namespace lobe::test;
+
+namespace {
+
+ImageAttributes madeOf(const std::string& integrator, double seed, double offset, double samples) {
+  return {{"integrator", integrator}, {"seed", seed}, {"sampleOffset", offset}, {"samples", samples}};
+}
+
+/// Pictures of 3×2 pixels in a folder of their own.
+struct Pictures {
+  Folder folder;
+  std::vector<std::filesystem::path> paths;
+
+  void add(float value, const ImageAttributes& attributes, int width = 3) {
+    paths.push_back(folder / fmt::format("{}.exr", paths.size()));
+    writeImage(paths.back(), Image(width, 2, Rgb(value, 2 * value, 0)), attributes);
+  }
+  std::string fault() const {
+    try {
+      mergeImages(paths);
+    } catch (const std::runtime_error& e) {
+      return e.what();
+    }
+    return {};
+  }
+};
+
+}  // namespace
+
+TEST_CASE("render: merged pictures are the mean by samples") {
+  Pictures p;
+  p.add(1.0f, madeOf("path", 1, 0, 3));
+  p.add(2.0f, madeOf("path", 1, 3, 1));
+  const MergedImage merged = mergeImages(p.paths);
+  REQUIRE((merged.image.width == 3 && merged.image.height == 2));
+  for (const Rgb& pixel : merged.image.pixels) CHECK((pixel == Rgb(1.25f, 2.5f, 0)).all());
+  CHECK(merged.attributes == madeOf("path", 1, 0, 4));
+}
+
+TEST_CASE("render: merged pictures say what they are made of, and can be merged again") {
+  Pictures p;
+  p.add(1, madeOf("path", 1, 0, 4));
+  p.add(1, madeOf("path", 1, 8, 4));
+  p.add(1, madeOf("guided", 1, 0, 4));
+  p.paths.push_back(p.folder / "merged.exr");
+  const MergedImage merged = mergeImages(std::span(p.paths).first(3));
+  CHECK(std::get<double>(merged.attributes.at("samples")) == 12);
+  CHECK(std::get<std::string>(merged.attributes.at("sampleRanges")) == "guided 1 0 4, path 1 0 4, path 1 8 12");
+  CHECK(merged.attributes.count("integrator") == 0);
+  CHECK(merged.attributes.count("sampleOffset") == 0);
+  writeImage(p.paths[3], merged.image, merged.attributes);
+
+  // The gap filled, path's samples are one range.
+  Pictures again;
+  again.add(1, madeOf("path", 1, 4, 4));
+  again.paths.push_back(p.paths[3]);
+  const MergedImage whole = mergeImages(again.paths);
+  CHECK(std::get<double>(whole.attributes.at("samples")) == 16);
+  CHECK(std::get<std::string>(whole.attributes.at("sampleRanges")) == "guided 1 0 4, path 1 0 12");
+
+  Pictures twice;
+  twice.add(1, madeOf("path", 1, 11, 1));
+  twice.paths.push_back(p.paths[3]);
+  CHECK(twice.fault() ==
+        fmt::format("{} and {}: both have samples 11 to 11 of seed 1 by path: render one with another --sample-offset "
+                    "or --seed",
+                    twice.paths[0].string(), twice.paths[1].string()));
+}
+
+TEST_CASE("render: the same samples of another seed or integrator are others") {
+  Pictures p;
+  p.add(1, madeOf("path", 1, 0, 4));
+  p.add(1, madeOf("path", 2, 0, 4));
+  p.add(1, madeOf("product", 1, 0, 4));
+  CHECK(p.fault().empty());
+  p.add(1, madeOf("path", 2, 3, 1));
+  CHECK_THAT(p.fault(), Catch::Contains(p.paths[1].string() + " and " + p.paths[3].string()) &&
+                            Catch::Contains("samples 3 to 3 of seed 2 by path"));
+}
+
+TEST_CASE("render: attributes that all pictures share are kept, and of times and unknown seeds nothing is claimed") {
+  Pictures p;
+  p.add(1, {{"samples", 4.0}, {"software", "x"}, {"cacheHashes", "a"}, {"seconds", 3.0}});
+  p.add(3, {{"samples", 4.0}, {"software", "x"}, {"cacheHashes", "b"}, {"seconds", 3.0}});
+  const ImageAttributes attributes = mergeImages(p.paths).attributes;
+  CHECK(attributes == ImageAttributes{{"samples", 8.0}, {"software", "x"}});
+}
+
+TEST_CASE("render: pictures that cannot be merged are named") {
+  Pictures sizes;
+  sizes.add(1, madeOf("path", 1, 0, 4));
+  sizes.add(1, madeOf("path", 1, 4, 4), 4);
+  CHECK(sizes.fault() == fmt::format("{}: has 4x2 pixels, {} 3x2", sizes.paths[1].string(), sizes.paths[0].string()));
+  for (const ImageAttributes& attributes :
+       {ImageAttributes{}, {{"samples", 0.0}}, {{"samples", -1.0}}, {{"samples", 1.5}}, {{"samples", "many"}}}) {
+    Pictures p;
+    p.add(1, madeOf("path", 1, 0, 4));
+    p.add(1, attributes);
+    CHECK_THAT(p.fault(), Catch::Contains(p.paths[1].string() + ": does not say how many samples"));
+  }
+  for (const char* ranges : {"path 1 0", "path 1 4 4", "path 1 0 4 5", "path one 0 4", "path 1 0 4,"}) {
+    Pictures p;
+    p.add(1, {{"samples", 4.0}, {"sampleRanges", ranges}});
+    CAPTURE(ranges);
+    CHECK(p.fault().empty() == (std::string(ranges) == "path 1 0 4,"));
+  }
+  Pictures png;
+  png.paths.push_back(png.folder / "a.png");
+  writeImage(png.paths[0], Image(2, 2));
+  CHECK_THAT(png.fault(), Catch::Contains("a.png: does not say"));
+  png.paths[0] = png.folder / "none.exr";
+  CHECK_THAT(png.fault(), Catch::Contains("none.exr"));
+}
+
+TEST_CASE("render: lobecompare --merge writes what loberender's pictures are together") {
+  Pictures p;
+  p.add(1, madeOf("path", 1, 0, 3));
+  p.add(2, madeOf("path", 1, 3, 1));
+  const std::string out = p.folder / "out.exr", both = p.paths[0].string() + " " + p.paths[1].string();
+  const ToolRun run = runBinary(".", "lobecompare --merge " + out + " " + both);
+  CAPTURE(run.error);
+  CHECK((run.code == 0 && run.out.empty() && run.error.empty()));
+  CHECK(readImage(out).at(0, 0).x() == 1.25f);
+  CHECK(readAttributes(out) == madeOf("path", 1, 0, 4));
+  const auto code = [&](const std::string& arguments) { return runBinary(".", "lobecompare " + arguments).code; };
+  CHECK(code("--merge out.png " + both) == 2);
+  CHECK(code("--merge " + p.paths[0].string() + " " + both) == 2);
+  CHECK(code("--merge " + out + " --json " + both) == 2);
+  CHECK(code("--merge " + out + " " + p.paths[0].string()) == 2);
+  CHECK(code("--merge " + out + " " + p.paths[0].string() + " " + p.paths[0].string()) == 1);
+  CHECK(code("--merge /nowhere/out.exr " + both) == 1);
+}

@@ -1,0 +1,267 @@
+// Polygons, groups and creases: what meshes of files become, whatever the format.
+
+#include <catch2/catch.hpp>
+
+#include <chrono>
+#include <filesystem>
+#include <numbers>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <Eigen/Geometry>
+
+#include "scenes/meshes/obj.h"
+#include "scenes/meshes/ply.h"
+#include "scenes/meshes/polygon.h"
+#include "scenes/meshes/serialized.h"
+#include "tests/support/scenes_test_tools.h"
+
+using namespace lobe;
+using Catch::Matchers::Contains;
+
+namespace {
+
+double areaOf(const TriangleMesh& mesh) {
+  double area = 0;
+  for (const auto& [i, j, k] : mesh.triangles)
+    area += 0.5 * (mesh.positions[j] - mesh.positions[i]).cross(mesh.positions[k] - mesh.positions[i]).norm();
+  return area;
+}
+
+using Polygon = std::vector<Vec2>;
+
+Polygon startingAt(Polygon corners, std::size_t first) {
+  std::ranges::rotate(corners, corners.begin() + static_cast<std::ptrdiff_t>(first));
+  return corners;
+}
+
+std::string plyOf(const Polygon& corners) {
+  std::string text = fmt::format(
+      "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
+      "element face 1\nproperty list int int vertex_indices\nend_header\n",
+      corners.size());
+  for (const Vec2& p : corners) text += fmt::format("{} {} 0\n", p.x(), p.y());
+  text += fmt::format("{}", corners.size());
+  for (std::size_t i = 0; i < corners.size(); ++i) text += fmt::format(" {}", i);
+  return text + "\n";
+}
+
+std::string objOf(const Polygon& corners) {
+  std::string text, face = "f";
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    text += fmt::format("v {} {} 0\n", corners[i].x(), corners[i].y());
+    face += fmt::format(" {}", i + 1);
+  }
+  return text + face + "\n";
+}
+
+/// Two squares that share the edge from (0,0,0) to (0,1,0): one in z = 0 towards +x, the other turned up about the edge
+/// by so many degrees. They are faces 1 2 3 4 and 5 1 4 6.
+std::string hinge(float degrees) {
+  const float angle = degrees * std::numbers::pi_v<float> / 180;
+  const float x = -std::cos(angle), z = std::sin(angle);
+  return fmt::format("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv {0} 0 {1}\nv {0} 1 {1}\n", x, z);
+}
+
+/// The largest angle in degrees between a triangle's normal and those of its vertices.
+double largestTurn(const TriangleMesh& mesh) {
+  double largest = 0;
+  for (const auto& t : mesh.triangles) {
+    const Vec3 normal =
+        (mesh.positions[t[1]] - mesh.positions[t[0]]).cross(mesh.positions[t[2]] - mesh.positions[t[0]]).normalized();
+    for (const std::uint32_t i : t)
+      largest = std::max(largest, std::atan2(normal.cross(mesh.normals[i]).norm(), normal.dot(mesh.normals[i])) *
+                                      180.0 / std::numbers::pi);
+  }
+  return largest;
+}
+
+MeshOptions smoothUpTo(float degrees) {
+  MeshOptions options;
+  options.maxSmoothAngle = degrees;
+  return options;
+}
+
+std::string faultOfReading(const auto& read) {
+  try {
+    read();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+}  // namespace
+
+TEST_CASE("scenes: concave polygons keep their area from every corner, in PLY and OBJ") {
+  const TestFolder folder;
+  const std::vector<std::pair<Polygon, double>> shapes = {
+      {{{-0.8f, -0.8f}, {0, 0}, {0.8f, -0.8f}, {0, 0.2f}}, 0.16},            // dart
+      {{{0, 0}, {2, 0}, {2, 0.5f}, {0.5f, 0.5f}, {0.5f, 2}, {0, 2}}, 1.75},  // L
+      {{{0, 0}, {5, 0}, {5, 3}, {4, 3}, {4, 1}, {3, 1}, {3, 3}, {2, 3}, {2, 1}, {1, 1}, {1, 3}, {0, 3}},
+       11.0}};  // comb
+  for (const auto& [corners, area] : shapes)
+    for (std::size_t first = 0; first < corners.size(); ++first) {
+      CAPTURE(area, first);
+      const Polygon polygon = startingAt(corners, first);
+      const TriangleMesh ply = readPly(folder.write("a.ply", plyOf(polygon)), {});
+      const TriangleMesh obj = readObj(folder.write("a.obj", objOf(polygon)), {});
+      CHECK(areaOf(ply) == Approx(area));
+      CHECK(areaOf(obj) == Approx(area));
+      CHECK(ply.triangles == obj.triangles);
+      CHECK(ply.triangles.size() == corners.size() - 2);
+    }
+}
+
+TEST_CASE("scenes: dividing a polygon of many corners takes quadratic time at most") {
+  // Teeth along a straight side: half of the corners are reflex, and ears are found late.
+  std::vector<Eigen::Vector3d> comb;
+  constexpr int kTeeth = 1000;
+  for (int i = 0; i < kTeeth; ++i) {
+    comb.emplace_back(2 * i, 0, 0);
+    comb.emplace_back(2 * i + 1, 1, 0);
+  }
+  comb.emplace_back(2 * kTeeth, 2, 0);
+  comb.emplace_back(0, 2, 0);
+  const auto start = std::chrono::steady_clock::now();
+  const auto triangles = triangulate(comb);
+  CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(5));
+  double area = 0;
+  for (const auto& [i, j, k] : triangles) area += 0.5 * (comb[j] - comb[i]).cross(comb[k] - comb[i]).z();
+  double expected = 0;  // by the shoelace formula
+  for (std::size_t i = 0; i < comb.size(); ++i) {
+    const Eigen::Vector3d &a = comb[i], &b = comb[(i + 1) % comb.size()];
+    expected += 0.5 * (a.x() * b.y() - b.x() * a.y());
+  }
+  CHECK(area == Approx(expected));
+}
+
+TEST_CASE("scenes: PLY faces may come before vertices") {
+  const TestFolder folder;
+  const TriangleMesh mesh = readPly(
+      folder.write("a.ply",
+                   "ply\nformat ascii 1.0\nelement face 1\nproperty list int int vertex_indices\nelement vertex 4\n"
+                   "property float x\nproperty float y\nproperty float z\nend_header\n4 0 1 2 3\n"
+                   "-0.8 -0.8 0\n0 0 0\n0.8 -0.8 0\n0 0.2 0\n"),
+      {});
+  CHECK(areaOf(mesh) == Approx(0.16));
+}
+
+TEST_CASE("scenes: PLY texture coordinates may be those of faces") {
+  const TestFolder folder;
+  const auto ply = [&](const std::string& name, const std::string& faces) {
+    return folder.write(
+        "a.ply",
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+        "property float s\nproperty float t\nelement face 2\nproperty list uchar int vertex_indices\n"
+        "property list uchar float " +
+            name + "\nproperty int texnumber\nend_header\n0 0 0 9 9\n1 0 0 9 9\n1 1 0 9 9\n0 1 0 9 9\n" + faces);
+  };
+  for (const std::string name : {"texcoord", "texture_uv"}) {
+    // The second triangle shows another part of the image, but for the corner at vertex 2.
+    const TriangleMesh mesh =
+        readPly(ply(name, "3 0 1 2 6 0 0 0.5 0 0.5 0.5 0\n3 0 2 3 6 0.25 0 0.5 0.5 0.25 0.75 0\n"), {});
+    REQUIRE(mesh.triangles == std::vector<std::array<std::uint32_t, 3>>{{0, 1, 2}, {3, 2, 4}});
+    REQUIRE(mesh.uvs.size() == 5);
+    CHECK(mesh.uvs[1] == Vec2(0.5f, 0));
+    CHECK(mesh.uvs[3] == Vec2(0.25f, 0));
+    CHECK(mesh.uvs[4] == Vec2(0.25f, 0.75f));
+    CHECK(mesh.positions[3] == Vec3(0, 0, 0));
+  }
+  CHECK(readPly(ply("texcoord", "3 0 1 2 0 0\n3 0 2 3 0 0\n"), {}).uvs[3] == Vec2(0, 0));
+  const auto fault = [&](const std::string& faces) {
+    return faultOfReading([&] { readPly(ply("texcoord", faces), {}); });
+  };
+  CHECK_THAT(fault("3 0 1 2 4 0 0 1 1 0\n3 0 2 3 0 0\n"), Contains("3 corners has 4 texture coordinates"));
+  CHECK_THAT(fault("3 0 1 2 6 0 0 1 1 1 nan 0\n3 0 2 3 0 0\n"), Contains("not a finite number"));
+}
+
+TEST_CASE("scenes: normals are smooth over edges below maxSmoothAngle only") {
+  const TestFolder folder;
+  const std::filesystem::path path = folder.write("a.obj", hinge(40) + "f 1 2 3 4\nf 5 1 4 6\n");
+  CHECK(largestTurn(readObj(path, {})) == Approx(20));
+  const TriangleMesh creased = readObj(path, smoothUpTo(39));
+  CHECK(creased.positions.size() == 8);
+  CHECK(largestTurn(creased) == Approx(0).margin(1e-3));
+  const TriangleMesh smooth = readObj(path, smoothUpTo(41));
+  CHECK(smooth.positions.size() == 6);
+  CHECK(largestTurn(smooth) == Approx(20));
+}
+
+TEST_CASE("scenes: maxSmoothAngle looks at places, not at indices, and does without the file's normals") {
+  const TestFolder folder;
+  // The second square has vertices of its own, and all have a normal that is wrong.
+  const std::string text = hinge(40) + "v 0 0 0\nv 0 1 0\nvn 1 0 0\nf 1//1 2//1 3//1 4//1\nf 5//1 7//1 8//1 6//1\n";
+  const std::filesystem::path path = folder.write("a.obj", text);
+  CHECK(largestTurn(readObj(path, smoothUpTo(39))) == Approx(0).margin(1e-3));
+  const TriangleMesh smooth = readObj(path, smoothUpTo(41));
+  CHECK(smooth.positions.size() == 6);
+  CHECK(largestTurn(smooth) == Approx(20));
+  // The angle is that in the world.
+  MeshOptions stretched = smoothUpTo(60);
+  stretched.toWorld = Eigen::Affine3f(Eigen::Scaling(1.0f, 1.0f, 10.0f)).matrix();
+  CHECK(largestTurn(readObj(path, stretched)) == Approx(0).margin(1e-3));
+}
+
+TEST_CASE("scenes: an OBJ's normals are smooth over its groups as in Mitsuba") {
+  const TestFolder folder;
+  const std::filesystem::path path = folder.write("a.obj", hinge(40) + "g a\nf 1 2 3 4\ng b\nf 5 1 4 6\n");
+  const auto turn = [&](ObjGrouping grouping) {
+    const auto meshes = readObjByMaterial(path, {}, {{}, -1, grouping});
+    REQUIRE(meshes.size() == 1);
+    CHECK(areaOf(meshes[0]) == Approx(2));
+    return largestTurn(meshes[0]);
+  };
+  CHECK(turn(ObjGrouping::joined) == Approx(20));
+  CHECK(turn(ObjGrouping::separate) == Approx(0).margin(1e-3));
+  CHECK(turn(ObjGrouping::collapsed) == Approx(20));
+}
+
+TEST_CASE("scenes: the meshes of an OBJ are counted as Mitsuba 0.6 does") {
+  const TestFolder folder;
+  // Neither a second `g` before any face nor `o` begins a mesh; `usemtl` does.
+  const std::filesystem::path path =
+      folder.write("a.obj",
+                   "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 2 0\nv 0 3 0\nv 0 4 0\ng a\nusemtl one\ng b\nf 1 2 3\no c\nf 1 "
+                   "2 4\nusemtl two\nf 1 2 5\ng d\ng e\nf 1 2 6\n");
+  const auto areas = [&](int mesh, ObjGrouping grouping) {
+    std::vector<double> result;
+    for (const TriangleMesh& part : readObjByMaterial(path, {}, {{"one", "two"}, mesh, grouping}))
+      result.push_back(areaOf(part));
+    return result;
+  };
+  using Areas = std::vector<double>;
+  CHECK(areas(-1, ObjGrouping::separate) == Areas{1.5, 3.5, 0});
+  CHECK(areas(0, ObjGrouping::separate) == Areas{1.5, 0, 0});
+  CHECK(areas(1, ObjGrouping::joined) == Areas{0, 1.5, 0});
+  CHECK(areas(2, ObjGrouping::separate) == Areas{0, 2, 0});
+  CHECK(areas(-1, ObjGrouping::collapsed) == Areas{0, 5, 0});
+  CHECK_THAT(faultOfReading([&] { areas(3, ObjGrouping::separate); }),
+             Contains("a.obj: there is no mesh 3: the file has 3, counted from 0"));
+}
+
+TEST_CASE("scenes: readers of meshes say alike why a file cannot be had") {
+  const TestFolder folder;
+  for (const std::string type : {"obj", "ply", "serialized"}) {
+    const auto fault = [&](const std::filesystem::path& path) {
+      return faultOfReading([&] {
+        if (type == "obj") readObj(path, {});
+        if (type == "ply") readPly(path, {});
+        if (type == "serialized") readSerialized(path, 0, {});
+      });
+    };
+    const std::filesystem::path absent = folder.path() / "absent";
+    CHECK(fault(absent) == absent.string() + ": no such file");
+    CHECK(fault(folder.path()) == folder.path().string() + ": is a folder, not a file");
+    CHECK_THAT(fault(folder.path() / std::string(300, 'a')), Contains("cannot open: ") && Contains("too long"));
+  }
+}
+
+TEST_CASE("scenes: a vertex too far away is refused") {
+  const TestFolder folder;
+  const auto fault = [&](const std::string& x) {
+    return faultOfReading([&] { readObj(folder.write("a.obj", "v 0 0 0\nv " + x + " 0 0\nv 0 1 0\nf 1 2 3\n"), {}); });
+  };
+  CHECK(fault("9e14") == "");
+  CHECK_THAT(fault("1e18"), Contains("a.obj: a vertex at 1e+18, 0, 0") && Contains("over 1e+15"));
+}

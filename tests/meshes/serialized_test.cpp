@@ -1,0 +1,149 @@
+// Serialized meshes, written here as Mitsuba writes them.
+
+#include <cstring>
+#include <fstream>
+
+#include <zlib.h>
+#include <catch2/catch.hpp>
+
+#include "scenes/meshes/serialized.h"
+#include "tests/support/tool_run.h"
+
+using namespace lobe;
+using Catch::Contains;
+
+namespace {
+
+template <class T>
+void put(std::string& bytes, const T& value) {
+  bytes.append(reinterpret_cast<const char*>(&value), sizeof(T));
+}
+
+struct Written {
+  std::uint16_t version = 4;
+  std::uint32_t flags = 0x1003;  ///< single precision, normals, texture coordinates
+  std::uint64_t vertices = 3, triangles = 1;
+  std::uint32_t lastIndex = 2;
+  float shift = 0;  ///< of x
+};
+
+template <class Real>
+std::string vertexData(const Written& mesh) {
+  std::string data;
+  for (const Real x : {0, 0, 0, 1, 0, 0, 0, 1, 0}) put<Real>(data, x + static_cast<Real>(mesh.shift));
+  if (mesh.flags & 1)
+    for (const Real x : {0, 0, 1, 0, 0, 1, 0, 0, 1}) put(data, x);
+  if (mesh.flags & 2)
+    for (const Real x : {0.0, 0.25, 1.0, 0.25, 0.0, 0.75}) put(data, static_cast<Real>(x));
+  if (mesh.flags & 8) data.append(9 * sizeof(Real), '\x3f');
+  return data;
+}
+
+std::string compressed(const std::string& data) {
+  uLongf size = compressBound(data.size());
+  std::string packed(size, '\0');
+  REQUIRE(compress(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(data.data()),
+                   data.size()) == Z_OK);
+  return packed.substr(0, size);
+}
+
+std::string meshBytes(const Written& mesh) {
+  std::string data;
+  put(data, mesh.flags);
+  if (mesh.version == 4) data += std::string("a name") + '\0';
+  put(data, mesh.vertices);
+  put(data, mesh.triangles);
+  data += mesh.flags & 0x2000 ? vertexData<double>(mesh) : vertexData<float>(mesh);
+  for (const std::uint32_t i : {0u, 1u, mesh.lastIndex}) put(data, i);
+  std::string bytes;
+  put<std::uint16_t>(bytes, 0x041c);
+  put(bytes, mesh.version);
+  return bytes + compressed(data);
+}
+
+std::string fileOf(const std::vector<Written>& meshes) {
+  std::string bytes;
+  std::vector<std::uint64_t> offsets;
+  for (const Written& mesh : meshes) {
+    offsets.push_back(bytes.size());
+    bytes += meshBytes(mesh);
+  }
+  for (const std::uint64_t offset : offsets)
+    if (meshes[0].version == 4)
+      put(bytes, offset);
+    else
+      put(bytes, static_cast<std::uint32_t>(offset));
+  put(bytes, static_cast<std::uint32_t>(offsets.size()));
+  return bytes;
+}
+
+TriangleMesh read(const std::string& bytes, int index = 0, const MeshOptions& options = {}) {
+  const test::Folder folder;
+  const std::filesystem::path path = folder / "a.serialized";
+  std::ofstream(path, std::ios::binary) << bytes;
+  return readSerialized(path, index, options);
+}
+
+}  // namespace
+
+TEST_CASE("scenes: serialized meshes of both versions and precisions") {
+  Written mesh;
+  mesh.version = GENERATE(std::uint16_t{3}, std::uint16_t{4});
+  mesh.flags = GENERATE(0x1003u, 0x2003u, 0x200bu);
+  const TriangleMesh result = read(fileOf({mesh}));
+  REQUIRE(result.positions.size() == 3);
+  CHECK(result.positions[1] == Vec3(1, 0, 0));
+  CHECK(result.normals.at(0) == Vec3(0, 0, 1));
+  CHECK(result.uvs.at(2) == Vec2(0, 0.75f));
+  CHECK(result.triangles == std::vector<std::array<std::uint32_t, 3>>{{0, 1, 2}});
+}
+
+TEST_CASE("scenes: serialized meshes are told apart by index") {
+  Written first, second;
+  second.shift = 10;
+  second.flags = 0x1000;
+  const TriangleMesh mesh = read(fileOf({first, second, first}), 1);
+  CHECK(mesh.positions[0].x() == 10);
+  CHECK(mesh.uvs.empty());
+  CHECK(mesh.normals.size() == 3);  // made
+  second.flags = 0x1011;
+  CHECK(read(fileOf({second})).normals.empty());  // flat, says the file
+}
+
+TEST_CASE("scenes: broken serialized meshes are refused") {
+  const Written good;
+  const std::string bytes = fileOf({good, good});
+  CHECK_THROWS_WITH(read(bytes, 2), Contains("a.serialized: there is no mesh 2") && Contains("has 2"));
+  CHECK_THROWS_WITH(read("PLY, if anything"), Contains("not a serialized mesh"));
+  CHECK_THROWS_WITH(read(""), Contains("not a serialized mesh"));
+  CHECK_THROWS_WITH(readSerialized("/none/b.serialized", 0, {}), Contains("b.serialized"));
+  Written bad;
+  bad.version = 5;
+  CHECK_THROWS_WITH(read(fileOf({bad})), Contains("version 5"));
+  bad = good;
+  bad.lastIndex = 3;
+  CHECK_THROWS_WITH(read(fileOf({bad})), Contains("vertex 3 of 3"));
+  bad = good;
+  bad.vertices = std::uint64_t{1} << 31;
+  CHECK_THROWS_WITH(read(fileOf({bad})), Contains("damaged"));
+  bad.vertices = std::uint64_t{1} << 62;
+  CHECK_THROWS_WITH(read(fileOf({bad})), Contains("2^32"));
+  bad = good;
+  bad.triangles = std::uint64_t{1} << 62;
+  CHECK_THROWS_WITH(read(fileOf({bad})), Contains("damaged"));
+  bad.triangles = 2;
+  CHECK_THROWS_WITH(read(fileOf({bad})), Contains("damaged or cut short"));
+}
+
+TEST_CASE("scenes: any byte of a serialized mesh may be wrong") {
+  const std::string bytes = fileOf({Written{}, Written{}});
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    std::string broken = bytes;
+    broken[i] = static_cast<char>(broken[i] ^ 0xff);
+    for (const std::string& tried : {broken, bytes.substr(0, i)}) try {
+        read(tried, 1);
+      } catch (const std::runtime_error& error) {
+        CHECK_THAT(error.what(), Contains("a.serialized"));
+      }
+  }
+}

@@ -1,0 +1,343 @@
+// Emitters: sampling, densities, photons.
+
+#include "materials/textures/bitmap.h"
+#include "materials/textures/checkerboard.h"
+#include "runtime/render/lights/delta_lights.h"
+#include "runtime/render/training/particle_tracer.h"
+#include "tests/support/chi2.h"
+#include "tests/support/render_test_tools.h"
+
+using namespace lobe;
+using namespace lobe::test;
+
+namespace {
+
+// A sky with a small bright sun.
+Image sunnySky() {
+  Image image(32, 16);
+  for (int y = 0; y < 16; ++y)
+    for (int x = 0; x < 32; ++x) image.at(x, y) = Rgb(0.2f + 0.02f * x, 0.3f, 0.1f * y);
+  image.at(0, 3) = grey(500);  // on the seam
+  return image;
+}
+
+Environment turnedSky() {
+  const Eigen::Matrix3f rotation =
+      (Eigen::AngleAxisf(0.7f, Vec3::UnitX()) * Eigen::AngleAxisf(2.1f, Vec3::UnitY())).toRotationMatrix();
+  return {sunnySky(), rotation};
+}
+
+// The density of Lights::sample for a direction, by tracing it.
+float pdfByTracing(const RenderScene& scene, const Vec3& point, const Vec3& wi) {
+  const auto hit = scene.tracer.trace({point, wi});
+  return hit ? scene.lights.pdf(point, *hit) : scene.lights.environmentPdf(wi);
+}
+
+struct LightCase {
+  std::string name;
+  Scene scene;
+  Vec3 point;
+};
+
+// Scenes of which every light is seen from the point and hides no other.
+std::vector<LightCase> lightCases() {
+  std::vector<LightCase> cases;
+  const auto add = [&](const std::string& name, const Vec3& point) -> Scene& {
+    return cases.emplace_back(LightCase{name, {}, point}).scene;
+  };
+  addEmitter(add("rectangle", {0, 0, 0}), rectangle({-1, 1, -2}, {2, 0, 0}, {0, 0, 3}), 1);
+  addEmitter(add("sphere from outside", {0.5f, 0, 0}), Sphere{{2, 1, 1}, 0.9f}, 1);
+  addEmitter(add("sphere from inside", {0.5f, 0.2f, 0}), Sphere{{0, 0, 0}, 1, true}, 1);
+  addEmitter(add("disk", {0, 0, 0}), Disk{{0, 1, 1}, {1.5f, 0, 0}, {0, 0, 1.5f}}, 1);
+  addEmitter(add("ellipse", {0, 0, 0}), Disk{{0, 1, 1}, {1.5f, 0, 0}, {0.6f, 0.1f, 0.8f}}, 1);
+  addEmitter(add("cylinder from outside", {2, 0.5f, 0}), Cylinder{{0, 0, -1}, {0, 1, 0}, {-1, 0, 0}, {0, 0, 3}}, 1);
+  addEmitter(add("cylinder from inside", {0.5f, 0.2f, 0}), Cylinder{{0, 0, -1}, {0, 1, 0}, {-1, 0, 0}, {0, 0, 3}, true},
+             1);
+  addEmitter(add("box from inside", {0.5f, 0.2f, 0}), box({-1, -1, -1}, {1, 2, 1}, true), 1);
+  add("constant environment", {0, 0, 0}).environment = environment(Image(1, 1, grey(2)));
+  add("environment", {0, 0, 0}).environment = turnedSky();
+  Scene& several = add("several", {0, 0, 0});
+  addEmitter(several, rectangle({-1, 1, -1}, {2, 0, 0}, {0, 0, 2}), 1);
+  addEmitter(several, Sphere{{3, 0, 0}, 0.5f}, 5);
+  addEmitter(several, Disk{{0, 0, -3}, {1, 0, 0}, {0, 1, 0}}, 2);
+  several.environment = turnedSky();
+  return cases;
+}
+
+}  // namespace
+
+TEST_CASE("render: the density of a light sample is the density of its direction") {
+  for (const LightCase& c : lightCases()) {
+    CAPTURE(c.name);
+    const RenderScene ready(c.scene);
+    Rng rng(4);
+    int differing = 0;
+    for (int i = 0; i < 5000; ++i) {
+      const float choice = rng.uniform();
+      const auto light = ready.lights.sample(c.point, choice, rng.uniform2());
+      if (!light || (!light->source && ready.tracer.occluded({c.point, light->wi}))) continue;
+      const float pdf = pdfByTracing(ready, c.point, light->wi);
+      differing += std::abs(pdf - light->pdf) > 5e-3f * light->pdf;
+    }
+    CHECK(differing <= 10);  // rays that pass an edge by rounding
+  }
+}
+
+TEST_CASE("render: light sampling draws what its density says") {
+  const std::vector<LightCase> cases = lightCases();
+  for (const LightCase& c : cases) {
+    const RenderScene ready(c.scene);
+    Rng rng(11);
+    const auto draw = [&]() -> std::optional<Vec3> {
+      const float choice = rng.uniform();
+      const auto light = ready.lights.sample(c.point, choice, rng.uniform2());
+      if (!light || (!light->source && ready.tracer.occluded({c.point, light->wi}))) return std::nullopt;
+      return light->wi;
+    };
+    const Chi2Result result = chi2Sphere(draw, [&](const Vec3& w) { return pdfByTracing(ready, c.point, w); });
+    INFO(c.name << ": " << result.message);
+    CHECK(result.passed(static_cast<int>(cases.size())));
+  }
+}
+
+TEST_CASE("render: a wrong density of light sampling is found") {
+  const LightCase c = lightCases().back();
+  const RenderScene ready(c.scene);
+  Rng rng(11);
+  const auto draw = [&]() -> std::optional<Vec3> {
+    const float choice = rng.uniform();
+    const auto light = ready.lights.sample(c.point, choice, rng.uniform2());
+    return light ? std::optional(light->wi) : std::nullopt;
+  };
+  const auto wrong = [&](const Vec3& w) { return pdfByTracing(ready, c.point, w) * (1.0f + 0.3f * w.x()); };
+  CHECK_FALSE(chi2Sphere(draw, wrong).passed());
+}
+
+TEST_CASE("render: an environment's mean light is its flux, and blocks share it") {
+  const EnvironmentLight light(turnedSky());
+  Rng rng(6);
+  Moments bySample, byBlock, uniform;
+  const PixelBlock left{0, 0, 11, 16}, right{11, 0, 32, 16};
+  const double leftFraction = light.blockWeight(left) / (light.blockWeight(left) + light.blockWeight(right));
+  double worstSplit = 0;
+  int differing = 0;
+  for (int i = 0; i < 200000; ++i) {
+    if (const auto s = light.sample(rng.uniform2())) bySample.add(luminance(s->radiance) / s->pdf);
+    const bool first = rng.uniform() < leftFraction;
+    if (const auto s = light.sample(first ? left : right, rng.uniform2())) {
+      byBlock.add(luminance(s->radiance) / light.pdf(s->wi));
+      differing += std::abs(light.pdf(first ? left : right, s->wi) - s->pdf) > 0.02f * s->pdf;
+    }
+    const Vec3 w = squareToSphere(rng.uniform2());
+    uniform.add(luminance(light.radiance(w)) * 4 * kPi);
+    const double split = leftFraction * light.pdf(left, w) + (1 - leftFraction) * light.pdf(right, w);
+    worstSplit = std::max(worstSplit, std::abs(split / light.pdf(w) - 1));
+  }
+  CHECK(deviation(bySample, uniform) < kMaxDeviation);
+  CHECK(deviation(byBlock, uniform) < kMaxDeviation);
+  CHECK(worstSplit < 1e-4);
+  CHECK(differing == 0);
+  // Radiance over density hardly varies: that is the point of sampling by importance.
+  CHECK(bySample.error() * std::sqrt(200000.0) < 0.1 * bySample.mean());
+  CHECK(light.flux() == Approx(bySample.mean()).epsilon(0.03));
+}
+
+TEST_CASE("render: the environment's image is the right way round") {
+  Image image(8, 4, grey(0));
+  image.at(2, 1) = grey(1);
+  const EnvironmentLight light(environment(image));
+  // The centre of that pixel, by the contract of scene.h.
+  const float u = 2.5f / 8, v = 1.5f / 4;
+  const Vec3 w(std::sin(2 * kPi * u) * std::sin(kPi * v), std::cos(kPi * v),
+               -std::cos(2 * kPi * u) * std::sin(kPi * v));
+  CHECK(light.radiance(w).x() == Approx(1));
+  CHECK(light.pixelOf(w) == Eigen::Vector2i(2, 1));
+  CHECK(light.radiance(-w).x() == 0);
+}
+
+TEST_CASE("render: what an environment's file has wrong counts as black") {
+  Image image(2, 2, grey(1));
+  image.at(0, 0) = Rgb(std::nanf(""), -1, kInfinity);
+  const EnvironmentLight light(environment(image));
+  CHECK(light.weight(0, 0) == 0);
+  CHECK(light.radiance(Vec3::UnitY()).allFinite());
+  Scene dark;
+  dark.environment = environment(Image(4, 2));
+  addShape(dark, Sphere{{0, 0, 0}, 1}, -1);
+  const RenderScene ready(dark);
+  CHECK(ready.lights.empty());
+  CHECK_FALSE(ready.lights.sample({2, 0, 0}, 0.5f, {0.5f, 0.5f}));
+  CHECK(ready.lights.environmentPdf({0, 1, 0}) == 0);
+}
+
+TEST_CASE("render: delta lights have the flux of their closed forms, whatever the scene's size") {
+  const auto power = [](const DeltaLight& light, float size) {
+    Scene scene;
+    addShape(scene, Sphere{{0, 0, 0}, size}, -1);
+    scene.lights = {light};
+    const RenderScene ready(scene);
+    CHECK(ready.lights.environmentProbability() == 0);
+    Rng rng(3);
+    Moments photons;
+    for (int i = 0; i < 20000; ++i) {
+      const float choice = rng.uniform();
+      const Vec2 u1 = rng.uniform2();
+      const auto photon = ready.lights.samplePhoton(choice, u1, rng.uniform2());
+      photons.add(photon ? luminance(photon->power) / ready.lights.totalPower() : 0);
+      if (photon) CHECK(photon->emitterDensity == kInfinity);
+    }
+    CHECK(deviation(photons, 1) < kMaxDeviation);
+    return ready.lights.totalPower();
+  };
+  CHECK(power(PointLight{{0, 0, 0}, grey(2)}, 1) == Approx(8 * kPi));
+  const Vec3 axis = Vec3(1, 2, -2) / 3;
+  const auto spot = [&](float cutoff, float beam) { return SpotLight{{0, 0, 0}, axis, grey(2), cutoff, beam}; };
+  CHECK(power(spot(kPi, kPi), 1) == Approx(8 * kPi));
+  CHECK(power(spot(kPi / 3, kPi / 3), 1) == Approx(2 * kPi));
+  CHECK(power(spot(kPi / 2, 0), 1) == Approx(4 * kPi * (1 - 2 / kPi)));
+  CHECK(power(spot(1e-3f, 1e-3f), 1) == Approx(2 * kPi * 1e-6));
+  // Of a texture of which half is black, in the cone's square; and a projector's picture: π × its area × its mean.
+  const TexturePtr board = makeCheckerboard(constantTexture(grey(1)), constantTexture(grey(0)));
+  const ProjectedTexture projected{board, axis.unitOrthogonal() * 0.5f, axis.unitOrthogonal().cross(axis) * 0.25f};
+  SpotLight textured = spot(kPi / 4, kPi / 4);
+  textured.texture = {{board, axis.unitOrthogonal() * 0.5f, axis.unitOrthogonal().cross(axis) * 0.5f}};
+  CHECK(power(textured, 1) == Approx(2 * kPi * (1 - std::sqrt(0.5))));
+  CHECK(power(ProjectorLight{{0, 0, 0}, axis, 3, projected}, 1) == Approx(kPi * 3 * 8 * 0.5));
+  const double root3 = std::sqrt(3.0);  // the bounding box's corner
+  for (const float size : {1e-9f, 1.0f, 1e15f})
+    CHECK(power(DirectionalLight{axis, grey(2)}, size) == Approx(2 * kPi * std::pow(root3 * size, 2)).epsilon(1e-4));
+}
+
+TEST_CASE("render: what emitter sampling does alone is not learnt") {
+  Scene scene;
+  addShape(scene, rectangle({-5, 0, -5}, {0, 0, 10}, {10, 0, 0}), addMaterial(scene, std::make_shared<Diffuse>(0.5f)));
+  SECTION("point") {
+    scene.lights.push_back(PointLight{{0, 1, 0}, grey(1)});
+  }
+  SECTION("directional") {
+    scene.lights.push_back(DirectionalLight{{0, -1, 0}, grey(1)});
+  }
+  const RenderScene ready(scene);
+  const Field nothing;
+  const GuidedSampler sampler(scene, nothing, nullptr);
+  const RayCamera camera({}, {});
+  const auto particles = [&](const RenderScene& s) {
+    return ParticleTracer(s, camera, sampler, sampler, nullptr, 1).tracePhotons(0, 2000).radiance.particles();
+  };
+  CHECK(particles(ready) == 0);
+  addShape(scene, Sphere{{0, 5, 0}, 4}, 0);  // what comes from the floor by way of a sphere is
+  CHECK(particles(RenderScene(scene)) > 10);
+}
+
+namespace {
+
+// A picture of four pixels, one of them black, projected along −y.
+ProjectedTexture uneven(float perUnit) {
+  auto image = std::make_shared<Image>(2, 2, grey(0));
+  image->at(1, 0) = grey(1);
+  image->at(0, 1) = grey(3);
+  image->at(1, 1) = grey(0.5f);
+  return {makeBitmap(image, {.nearest = true}), Vec3::UnitX() * perUnit, Vec3::UnitZ() * perUnit};
+}
+
+// Photons that reach a disk, against the light that reaches it as seen from its points.
+void checkPhotons(const Scene& emitters) {
+  Scene scene = emitters;
+  const Disk receiver{{0, 0, 0}, {0, 0, 0.4f}, {0.4f, 0, 0}};
+  addShape(scene, receiver, -1);
+  const RenderScene ready(scene);
+  const auto receiverShape = static_cast<int>(scene.shapes.size()) - 1;
+  Rng rng(9);
+  Moments photons, gathered, power;
+  for (int i = 0; i < 400000; ++i) {
+    const float choice = rng.uniform();
+    const Vec2 u1 = rng.uniform2();
+    const auto photon = ready.lights.samplePhoton(choice, u1, rng.uniform2());
+    const auto hit = photon ? ready.tracer.trace(photon->ray) : std::nullopt;
+    const bool received = hit && hit->shape == receiverShape && hit->wo.z() > 0;
+    photons.add(received ? luminance(photon->power) : 0);
+    power.add(photon ? luminance(photon->power) : 0);
+    const Vec2 d = squareToDisk(rng.uniform2());
+    const SurfacePoint point = pointOnDisk(receiver, d.x(), d.y());
+    const float lightChoice = rng.uniform();
+    const auto light = ready.lights.sample(point.position, lightChoice, rng.uniform2());
+    const bool lit = light && light->wi.y() > 0 && ready.visible(point, *light);
+    gathered.add(lit ? luminance(light->radiance) * light->wi.y() / light->pdf * kPi * 0.16f : 0);
+  }
+  CHECK(photons.mean() > 0);
+  CHECK(deviation(photons, gathered) < kMaxDeviation);
+  CHECK(power.mean() == Approx(ready.lights.totalPower()).epsilon(0.03));
+}
+
+}  // namespace
+
+TEST_CASE("render: photons bring the light that is gathered") {
+  Scene scene;
+  SECTION("rectangle") {
+    addEmitter(scene, rectangle({-1, 1, -1}, {2, 0, 0}, {0, 0, 2}), 2);
+  }
+  SECTION("sphere") {
+    addEmitter(scene, Sphere{{0.5f, 1.5f, 0}, 0.5f}, 2);
+  }
+  SECTION("disk") {
+    addEmitter(scene, Disk{{0, 1, 0}, {1, 0, 0}, {0, 0, 1}}, 2);
+  }
+  SECTION("ellipse") {
+    addEmitter(scene, Disk{{0, 1, 0}, {1, 0, 0}, {0.4f, 0.1f, 0.5f}}, 2);
+  }
+  SECTION("inside a sphere") {
+    addEmitter(scene, Sphere{{0, 0, 0}, 1.5f, true}, 2);
+  }
+  SECTION("environment") {
+    scene.environment = turnedSky();
+  }
+  SECTION("point") {
+    scene.lights.push_back(PointLight{{0.5f, 1, 0.2f}, grey(2)});
+  }
+  SECTION("spot") {
+    const Vec3 axis = Vec3(-0.4f, -1, 0).normalized();
+    scene.lights.push_back(SpotLight{{0.5f, 1, 0.2f}, axis, grey(2), 0.6f, 0.2f});
+  }
+  SECTION("spot with a texture") {
+    scene.lights.push_back(SpotLight{{0, 1, 0}, -Vec3::UnitY(), grey(2), 0.6f, 0.2f, uneven(0.5f / std::tan(0.6f))});
+  }
+  SECTION("projector") {
+    scene.lights.push_back(ProjectorLight{{0, 1, 0}, -Vec3::UnitY(), 2, uneven(0.7f)});
+  }
+  SECTION("directional") {
+    scene.lights.push_back(DirectionalLight{Vec3(1, -2, 0).normalized(), grey(2)});
+  }
+  SECTION("mixed") {
+    scene.lights.push_back(PointLight{{0.5f, 1, 0.2f}, grey(2)});
+    scene.lights.push_back(DirectionalLight{Vec3(1, -2, 0).normalized(), grey(3)});
+    scene.environment = environment(Image(1, 1, grey(1)));
+    addEmitter(scene, Sphere{{0.5f, 1.5f, 0}, 0.5f}, 20);
+  }
+  checkPhotons(scene);
+}
+
+TEST_CASE("render: a plane shows the image of a projector, a cone that of a spot") {
+  // 2 in front of the light, looked at along its axis.
+  const auto irradiance = [](const DeltaLight& light, const Vec3& at) {
+    const auto sample = illuminate(light, at);
+    return sample ? sample->radiance.x() * sample->wi.y() : 0.0f;
+  };
+  // On the plane at distance 1, x and z from −1 to 1 are its edges.
+  const ProjectorLight projector{{0, 2, 0}, -Vec3::UnitY(), 2, uneven(0.5f)};
+  const auto shown = [&](float x, float z) { return irradiance(projector, {x, 0, z}) / kPi; };
+  CHECK(shown(-1.9f, -0.1f) == 0);
+  CHECK(shown(0.1f, -1.9f) == Approx(2 * 1 / 4.0));
+  CHECK(shown(1.9f, -0.1f) == Approx(2 * 1 / 4.0));
+  CHECK(shown(-0.1f, 0.1f) == Approx(2 * 3 / 4.0));
+  CHECK(shown(1.9f, 1.9f) == Approx(2 * 0.5 / 4.0));
+  CHECK(shown(2.1f, 1) == 0);
+  CHECK(irradiance(projector, {0.1f, 4, -0.1f}) == 0);  // behind it
+
+  SpotLight spot{{0, 2, 0}, -Vec3::UnitY(), grey(2), kPi / 4, kPi / 4};
+  const float plain = irradiance(spot, {0.4f, 0, -0.3f});
+  spot.texture = uneven(0.5f);
+  CHECK(irradiance(spot, {0.4f, 0, -0.3f}) == Approx(plain));
+  CHECK(irradiance(spot, {-0.4f, 0, 0.3f}) == Approx(3 * plain));
+  CHECK(irradiance(spot, {0.4f, 0, 0.3f}) == Approx(0.5 * plain));
+  CHECK(irradiance(spot, {-0.4f, 0, -0.3f}) == 0);
+}

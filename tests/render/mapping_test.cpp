@@ -1,0 +1,94 @@
+// Mapped normals in pictures, against integrals over the hemisphere.
+
+#include "materials/registry.h"
+#include "tests/support/render_test_tools.h"
+
+using namespace lobe;
+using namespace lobe::test;
+
+namespace {
+
+/// A white floor that faces +z, the tangent along u being +x, under a constant sky of radiance 1.
+struct Floor {
+  explicit Floor(BsdfPtr bsdf) {
+    addShape(scene, rectangle({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), addMaterial(scene, std::move(bsdf)));
+    scene.environment = environment(Image(4, 2, grey(1.0f)));
+  }
+  Scene scene;
+};
+
+/// The normal (sin, 0, cos) of an angle from the normal as a map's colour.
+BsdfPtr mapOf(double degrees, bool flips, bool shadows) {
+  const double angle = degrees * std::numbers::pi / 180.0;
+  const Rgb colour(static_cast<float>(0.5 + 0.5 * std::sin(angle)), 0.5f,
+                   static_cast<float>(0.5 + 0.5 * std::cos(angle)));
+  Parameters diffuse, map;
+  diffuse.set("reflectance", 1.0);
+  map.set("normalmap", constantTexture(colour));
+  map.set("flip_invalid_normals", flips);
+  map.set("use_shadowing_function", shadows);
+  map.addChild(makeBsdf("diffuse", diffuse));
+  return makeBsdf("normalmap", map);
+}
+
+/// ∫ cosθ/π over the directions above floor and mapped surface, times the shadowing: what a white diffuse surface whose
+/// normal leans by the angle sends back of a sky of radiance 1. Without shadowing (1 + cos) / 2.
+double reflected(double degrees, bool shadows) {
+  const double angle = degrees * std::numbers::pi / 180.0;
+  const Eigen::Vector3d n(std::sin(angle), 0.0, std::cos(angle));
+  const double alpha2 = shadows ? std::min(1.0, std::pow(std::tan(angle), 2) / 8.0) : 0.0;
+  constexpr int kSteps = 1000;
+  double sum = 0.0;
+  for (int i = 0; i < kSteps; ++i)
+    for (int j = 0; j < kSteps; ++j) {
+      const double z = (i + 0.5) / kSteps, phi = std::numbers::pi * (j + 0.5) / kSteps, r = std::sqrt(1.0 - z * z);
+      const double cosine = n.dot(Eigen::Vector3d(r * std::cos(phi), 0.0, z));
+      sum += std::max(0.0, cosine) * 2.0 / (1.0 + std::sqrt(1.0 + alpha2 * (1.0 - z * z) / (z * z)));
+    }
+  return 2.0 * sum / (static_cast<double>(kSteps) * kSteps);
+}
+
+/// Along a ray that meets the floor's middle from the side that `towards` points to.
+Moments seenFrom(const Floor& floor, const Vec3& towards) {
+  const RenderScene ready(floor.scene);
+  return estimate(PathIntegrator(ready, {}), {2.0f * towards, -towards}, 20000);
+}
+
+const Vec3 kFacing = Vec3(0.9f, 0.1f, 0.3f).normalized();
+const Vec3 kAverted = Vec3(-0.9f, 0.1f, 0.3f).normalized();
+
+}  // namespace
+
+TEST_CASE("render: a mapped normal shows as the hemisphere that it shares with the surface") {
+  for (const double degrees : {0.0, 20.0, 50.0, 75.0})
+    for (const bool shadows : {false, true}) {
+      INFO(degrees << " degrees, shadowing " << shadows);
+      const double expected = reflected(degrees, shadows);
+      if (!shadows) CHECK(expected == Approx(0.5 + 0.5 * std::cos(degrees * std::numbers::pi / 180.0)).epsilon(1e-3));
+      CHECK(deviation(seenFrom(Floor(mapOf(degrees, true, shadows)), kFacing), expected) < kMaxDeviation);
+    }
+}
+
+TEST_CASE("render: a mapped normal that looks away is black, or looks as its mirror image") {
+  CHECK(seenFrom(Floor(mapOf(50.0, false, false)), kAverted).mean() == 0.0);
+  CHECK(deviation(seenFrom(Floor(mapOf(50.0, true, true)), kAverted), reflected(50.0, true)) < kMaxDeviation);
+}
+
+TEST_CASE("render: shadowing at the terminator is a factor on value and sample") {
+  const auto hitOf = [](const Scene& scene) {
+    return *RayTracer(scene).trace({Vec3(0.1f, 0.0f, 1.0f), Vec3(0.0f, 0.0f, -1.0f)});
+  };
+  const Floor floor(mapOf(45.0, true, true));
+  const SurfaceHit hit = hitOf(floor.scene);
+  CHECK(hit.terminatorRoughness2 == Approx(0.125f));
+  const Vec3 wi = Vec3(0.5f, 0.3f, 0.2f).normalized();
+  const double tangent2 = (0.25 + 0.09) / 0.04;
+  const double shadowing = 2.0 / (1.0 + std::sqrt(1.0 + 0.125 * tangent2));
+  CHECK(evalBsdf(hit, hit.frame.toLocal(wi)).x() == Approx(shadowing * kInvPi).epsilon(1e-4));
+  const auto sample = sampleBsdf(hit, 0.5f, Vec2(0.4f, 0.7f));
+  REQUIRE(sample);
+  CHECK(sample->f.isApprox(evalBsdf(hit, sample->wi)));
+  CHECK(sample->pdf == hit.bsdf->pdf(hit.wo, sample->wi, hit.uv));
+  CHECK(hitOf(Floor(mapOf(80.0, true, true)).scene).terminatorRoughness2 == 1.0f);
+  CHECK(hitOf(Floor(mapOf(80.0, true, false)).scene).terminatorRoughness2 == 0.0f);
+}

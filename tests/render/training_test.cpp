@@ -1,0 +1,263 @@
+// The estimators of training agree: photons with photons that importance guides, photons with camera paths, and all of
+// them with closed forms.
+
+#include <functional>
+#include <vector>
+
+#include "materials/registry.h"
+#include "runtime/guiding/sample_storage_data.h"
+#include "runtime/render/training/training.h"
+#include "tests/support/render_test_tools.h"
+
+using namespace lobe;
+using namespace lobe::test;
+
+namespace {
+
+constexpr float kAlbedo = 0.5f;
+
+/// The bin that a particle counts in; negative: none.
+using Binning = std::function<int(const Particle&)>;
+
+/// Flux by bin, each photon one estimate.
+std::vector<Moments> photonFlux(const RenderScene& scene, const GuidedSampler& importance, int count,
+                                std::uint64_t seed, int bins, const Binning& binOf) {
+  std::vector<Moments> moments(bins);
+  for (int i = 0; i < count; ++i) {
+    Rng rng(seed, 0, i);
+    const float choice = rng.uniform();
+    const Vec2 u1 = rng.uniform2();
+    PhotonResult result;
+    if (const auto photon = scene.lights.samplePhoton(choice, u1, rng.uniform2()))
+      PhotonWalk(scene, importance, rng, result).run(*photon, static_cast<std::uint64_t>(i));
+    std::vector<double> flux(bins);
+    for (const Particle& p : dataOf(result.radiance).photons)
+      if (const int bin = binOf(p); bin >= 0) flux[bin] += p.weight;
+    for (int bin = 0; bin < bins; ++bin) moments[bin].add(flux[bin]);
+  }
+  return moments;
+}
+
+/// A square of the floor y = 0 about the middle, with the side it is lit from.
+struct Patch {
+  float half = 0.5f;
+
+  double area() const { return 4.0 * half * half; }
+  bool contains(const Particle& p) const {
+    return p.normal.y() > 0.99f && p.position.y() < 1e-3f && std::abs(p.position.x()) < half &&
+           std::abs(p.position.z()) < half;
+  }
+  static constexpr int kRings = 3, kSectors = 6;
+  /// The bin of the direction: equal areas of the disc.
+  int bin(const Particle& p) const {
+    if (!contains(p)) return -1;
+    const Vec3& w = p.direction;
+    const int ring = std::min(static_cast<int>((1 - w.y() * w.y()) * kRings), kRings - 1);
+    const float turn = 0.5f + 0.5f * std::atan2(w.z(), w.x()) * kInvPi;
+    return ring * kSectors + std::min(static_cast<int>(turn * kSectors), kSectors - 1);
+  }
+};
+
+/// Flux on the patch by bin, from what camera paths find that start on it: L cosθ over the direction's density, times
+/// the area.
+std::vector<Moments> pathFlux(const RenderScene& scene, const GuidedSampler& sampler, const Patch& patch, int count,
+                              std::uint64_t seed) {
+  std::vector<Moments> moments(Patch::kRings * Patch::kSectors);
+  const ImportonWishes wishes{false, false, true};
+  for (int i = 0; i < count; ++i) {
+    Rng rng(seed, 0, i);
+    const Vec2 u = patch.half * (2 * rng.uniform2() - Vec2::Ones());
+    ImportonResult result;
+    ImportonWalk(scene, sampler, wishes, rng, result).run({Vec3(u.x(), 0.01f, u.y()), -Vec3::UnitY()}, 0);
+    const std::vector<Particle>& samples = dataOf(result.radiance).samples;
+    // Paths may come by again: only what the first vertex received is spread evenly over the patch.
+    const bool found = !samples.empty() && (samples[0].position - Vec3(u.x(), 0, u.y())).norm() < 1e-4f;
+    const int bin = found ? patch.bin(samples[0]) : -1;
+    for (int b = 0; b < static_cast<int>(moments.size()); ++b)
+      moments[b].add(b == bin ? patch.area() * samples[0].weight : 0);
+  }
+  return moments;
+}
+
+bool agree(const std::vector<Moments>& a, const std::vector<Moments>& b) {
+  double worst = 0, sumA = 0, sumB = 0, error2 = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (a[i].mean() == b[i].mean()) continue;
+    worst = std::max(worst, deviation(a[i], b[i]));
+    sumA += a[i].mean();
+    sumB += b[i].mean();
+    error2 += a[i].error() * a[i].error() + b[i].error() * b[i].error();
+  }
+  const double together = std::abs(sumA - sumB) / std::sqrt(error2);
+  UNSCOPED_INFO("worst " << worst << ", together " << together << ", " << sumA << " and " << sumB << " +- "
+                         << std::sqrt(error2));
+  return worst < kMaxDeviation && together < kMaxDeviation;
+}
+
+BsdfPtr dielectric(const char* type) {
+  Parameters parameters;
+  parameters.set("int_ior", 1.5);
+  parameters.set("ext_ior", 1.0);
+  return makeBsdf(type, parameters);
+}
+
+/// A room with a lamp that shines at the ceiling only: nothing on the floor is lit directly.
+Scene roomScene() {
+  Scene scene;
+  const int wall = addMaterial(scene, std::make_shared<Diffuse>(kAlbedo));
+  addShape(scene, box({-2, 0, -2}, {2, 3, 2}, true), wall);
+  addEmitter(scene, rectangle({-1.5f, 1.8f, -1.5f}, {0, 0, 1}, {1, 0, 0}), 4, wall);
+  return scene;
+}
+
+struct Guides {
+  Guides(const RenderScene& scene, const RayCamera& camera)
+      : radiance(optionsFor(scene)),
+        importance(optionsFor(scene)),
+        radianceSampler(scene.scene, radiance, nullptr),
+        importanceSampler(scene.scene, importance, nullptr) {
+    const ParticleTracer tracer(scene, camera, radianceSampler, importanceSampler, nullptr, 1);
+    for (int pass = 0; pass < 3; ++pass) {
+      ImportonResult importons = tracer.traceImportons(pass, 8000, {false, true, false});
+      PhotonResult photons = tracer.tracePhotons(pass, 10000);
+      importons.importance.merge(std::move(photons.importance));
+      importance.update(importons.importance);
+      importons.radiance.merge(std::move(photons.radiance));
+      radiance.update(importons.radiance);
+    }
+  }
+  static FieldOptions optionsFor(const RenderScene& scene) {
+    FieldOptions options;
+    options.sceneDiagonal = scene.tracer.bounds().diagonal().norm();
+    return options;
+  }
+  Field radiance, importance;
+  GuidedSampler radianceSampler, importanceSampler;
+};
+
+RayCamera roomCamera() {
+  Camera camera;
+  camera.width = camera.height = 16;
+  camera.horizontalFov = 40;
+  camera.toWorld.block<3, 4>(0, 0) << 1, 0, 0, 0, 0, 0, -1, 2.9f, 0, 1, 0,
+      0;  // from the ceiling, at the floor's middle
+  return {camera, {}};
+}
+
+struct Unguided {
+  explicit Unguided(const Scene& scene) : sampler(scene, nothing, nullptr) {}
+  Field nothing;
+  GuidedSampler sampler;
+};
+
+}  // namespace
+
+TEST_CASE("training: guided photons bring the same light as others, with less noise") {
+  Scene scene = roomScene();
+  addShape(scene, Sphere{{0.9f, 0.6f, 0.4f}, 0.5f}, addMaterial(scene, std::make_shared<HalfMirror>(0.4f, 0.5f, 0.5f)));
+  const RenderScene ready(scene);
+  const Guides guides(ready, roomCamera());
+  REQUIRE(guides.importance.records() > 30);
+  const Unguided unguided(scene);
+  const Patch patch{0.3f};
+  const auto bin = [&](const Particle& p) { return patch.bin(p); };
+  const int bins = Patch::kRings * Patch::kSectors;
+  const auto plain = photonFlux(ready, unguided.sampler, 200000, 1, bins, bin);
+  const auto guided = photonFlux(ready, guides.importanceSampler, 70000, 2, bins, bin);
+  CHECK(agree(plain, guided));
+  const auto all = [&](const Particle& p) { return patch.contains(p) ? 0 : -1; };
+  const Moments one = photonFlux(ready, unguided.sampler, 60000, 3, 1, all)[0];
+  const Moments other = photonFlux(ready, guides.importanceSampler, 60000, 4, 1, all)[0];
+  CHECK(other.error() < 0.9 * one.error());  // 0.77 as measured
+}
+
+TEST_CASE("training: camera paths and photons see the same light from the same directions") {
+  Scene scene = roomScene();
+  SECTION("indirect") {}
+  SECTION("by way of a half mirror") {
+    const int mirror = addMaterial(scene, std::make_shared<HalfMirror>(0.4f, 0.5f, 0.5f));
+    addShape(scene, Sphere{{-1.2f, 2.6f, 0.4f}, 0.35f}, mirror);
+  }
+  SECTION("and with a delta light, of which the direct part counts for neither") {
+    scene.lights.push_back(PointLight{{0.5f, 1, 0.2f}, grey(2)});
+  }
+  SECTION("through smooth water") {
+    addShape(scene, rectangle({-2, 1, -2}, {0, 0, 4}, {4, 0, 0}), addMaterial(scene, dielectric("dielectric")));
+  }
+  SECTION("through rough water") {
+    addShape(scene, rectangle({-2, 1, -2}, {0, 0, 4}, {4, 0, 0}), addMaterial(scene, dielectric("roughdielectric")));
+  }
+  const RenderScene ready(scene);
+  const Unguided unguided(scene);
+  const Guides guides(ready, roomCamera());
+  REQUIRE(guides.radiance.records() > 30);
+  const Patch patch;
+  const auto photons = photonFlux(ready, unguided.sampler, 100000, 1, Patch::kRings * Patch::kSectors,
+                                  [&](const Particle& p) { return patch.bin(p); });
+  CHECK(agree(photons, pathFlux(ready, unguided.sampler, patch, 30000, 2)));
+  CHECK(agree(photons, pathFlux(ready, guides.radianceSampler, patch, 30000, 3)));
+}
+
+TEST_CASE("training: in an integrating sphere all estimators have the closed form") {
+  const float radius = 2, intensity = 3;
+  Scene scene;
+  addShape(scene, Sphere{{0, 0, 0}, radius, true}, addMaterial(scene, std::make_shared<Diffuse>(kAlbedo)));
+  scene.lights.push_back(PointLight{{0, 0, 0}, grey(intensity)});
+  const RenderScene ready(scene);
+  const Unguided unguided(scene);
+  // Without the direct part, which is emitter sampling's alone.
+  const double irradiance = intensity / (radius * radius) * kAlbedo / (1 - kAlbedo);
+  const double area = 4 * kPi * radius * radius;
+  const auto flux = photonFlux(ready, unguided.sampler, 50000, 1, 1, [](const Particle&) { return 0; });
+  CHECK(deviation(flux[0], irradiance * area) < kMaxDeviation);
+  // Every vertex of every path is an estimate; those without a sample are zero. Paths are what is independent.
+  Moments excess;
+  for (int i = 0; i < 50000; ++i) {
+    Rng rng(2, 0, i);
+    ImportonResult result;
+    ImportonWalk(ready, unguided.sampler, {false, false, true}, rng, result).run({Vec3::Zero(), Vec3::UnitX()}, 0);
+    double sum = 0;
+    for (const Particle& p : dataOf(result.radiance).samples) sum += p.weight;
+    excess.add(sum - irradiance * static_cast<double>(dataOf(result.radiance).requests.size()));
+  }
+  CHECK(std::abs(excess.mean()) < kMaxDeviation * excess.error());
+}
+
+namespace {
+
+/// Says that its albedo is 1, whatever it is: particles then survive with any weight.
+class Boaster : public Diffuse {
+ public:
+  using Diffuse::Diffuse;
+  Rgb albedo(const Vec3&, const Vec2&) const override { return grey(1.0f); }
+};
+
+/// Light that leaves a floor of which only `albedo` is reflected, and what its five walls make of it: flux per albedo
+/// and per flux that the floor receives.
+Moments fluxFromFloor(float albedo, float walls) {
+  Scene scene;
+  addShape(scene, box({-1, -1, -1}, {1, 1, 1}, true), addMaterial(scene, std::make_shared<Diffuse>(walls)));
+  const int floor = addMaterial(scene, std::make_shared<Boaster>(albedo));
+  addShape(scene, rectangle({-1, -0.99f, -1}, {0, 0, 2}, {2, 0, 0}), floor);
+  const double cap = 2 * kPi * (1 - std::cos(0.5));  // solid angle of the cone
+  const float intensity = static_cast<float>(1 / (cap * albedo));
+  scene.lights.push_back(SpotLight{{0, 0, 0}, -Vec3::UnitY(), grey(intensity), 0.5f, 0.5f});
+  const RenderScene ready(scene);
+  const Unguided unguided(scene);
+  return photonFlux(ready, unguided.sampler, 20000, 1, 1, [](const Particle&) { return 0; })[0];
+}
+
+}  // namespace
+
+TEST_CASE("training: the weight window keeps the light, whatever it splits or ends") {
+  for (const float albedo : {40.0f, 3.0f, 0.5f, 1e-4f, 1e-8f}) {
+    const Moments flux = fluxFromFloor(albedo, 0);
+    INFO("albedo " << albedo << ": " << flux.mean() << " +- " << flux.error());
+    CHECK(deviation(flux, 1) < kMaxDeviation);
+  }
+  // Behind the first wall a photon of 1e-8 is one of a hundred.
+  const Moments kept = fluxFromFloor(1e-4f, kAlbedo), ended = fluxFromFloor(1e-8f, kAlbedo);
+  INFO(kept.mean() << " +- " << kept.error() << ", " << ended.mean() << " +- " << ended.error());
+  CHECK(kept.mean() > 1.5);
+  CHECK(deviation(kept, ended) < kMaxDeviation);
+}

@@ -1,0 +1,321 @@
+// Files with several faults, files of older versions, and encodings: what is reported, and what is read all the same.
+
+#include <fmt/format.h>
+#include <catch2/catch.hpp>
+
+#include "tests/support/scenes_test_tools.h"
+
+namespace lobe {
+namespace {
+
+SceneCheck check(const std::string& text, bool lenientReading = false) {
+  const TestFolder folder;
+  ReadOptions options;
+  options.lenient = lenientReading;
+  return checkScene(folder.write("test.xml", text), options);
+}
+
+/// From an older renderer, that passes over what it does not know.
+std::string oldSceneOf(const std::string& body) {
+  return "<scene version=\"0.6.0\">\n" + body + "\n" + kSensor + "\n</scene>\n";
+}
+
+Rgb albedoOf(const Scene& scene, std::size_t shape) {
+  const int material = scene.shapes.at(shape).material;
+  return scene.materials.at(static_cast<std::size_t>(material)).bsdf->albedo(Vec3::UnitZ(), Vec2(0.5f, 0.5f));
+}
+
+std::string utf16(const std::string& ascii, bool bigEndian, bool mark) {
+  std::string bytes = !mark ? "" : bigEndian ? "\xfe\xff" : "\xff\xfe";
+  for (const char c : ascii) bytes += bigEndian ? std::string{'\0', c} : std::string{c, '\0'};
+  return bytes;
+}
+
+}  // namespace
+
+TEST_CASE("scenes: all faults of a file are reported in one run, in groups") {
+  std::string body;
+  for (int i = 0; i < 12; ++i) body += fmt::format("<shape type=\"torus{}\"/>\n", i);
+  for (int i = 0; i < 5; ++i) body += "<shape type=\"knot\"/>\n";
+  body += "<shape type=\"sphere\"><float name=\"radius\" value=\"-1\"/></shape>";
+  const SceneCheck found = check(sceneOf(body));
+  REQUIRE(found.faults.size() == 14);
+  CHECK(found.faults[12].count == 5);
+  CHECK_THAT(found.faults[12].where, Catch::EndsWith("test.xml:14:1"));
+  CHECK_THAT(found.faults[13].text(), Catch::Contains("test.xml:19:22") && Catch::Contains("radius is ignored"));
+  CHECK(!found.readable);
+  const std::string message = faultOf(body);
+  CHECK(std::ranges::count(message, '\n') == 10);  // ten faults, and a line that counts them
+  CHECK_THAT(message, Catch::Contains("torus9") && !Catch::Contains("torus10\""));
+  CHECK_THAT(message,
+             Catch::EndsWith("18 faults of 14 kinds; --check shows the other 4; --lenient reads what can be read"));
+}
+
+TEST_CASE("scenes: lenient reading gets past every fault that leaves something to draw") {
+  const TestFolder folder;
+  folder.write("broken.ply", "ply\nformat ascii 1.0\n");
+  folder.write("broken.png", "not a picture");
+  const std::vector<std::string> faults = {
+      "<shape type=\"cube\"><bsdf type=\"roughplastic\"><float name=\"alpha\" value=\"x\"/></bsdf></shape>",
+      "<shape type=\"cube\"><bsdf type=\"roughplastic\"><float name=\"alpha\" value=\"-1\"/></bsdf></shape>",
+      "<shape type=\"ply\"><string name=\"filename\" value=\"broken.ply\"/></shape>",
+      "<shape type=\"ply\"/>",
+      "<shape/>",
+      "<shape type=\"cube\"><ref id=\"nobody\"/></shape>",
+      "<shape type=\"cube\"><float value=\"1\"/></shape>",
+      "<shape type=\"cube\">text</shape>",
+      "<shape type=\"cube\"><transform name=\"to_world\"><shear/></transform></shape>",
+      "<shape type=\"cube\"><transform name=\"to_world\"><scale value=\"0\"/></transform></shape>",
+      "<shape type=\"cube\"><bsdf type=\"diffuse\"/><bsdf type=\"diffuse\"/></shape>",
+      "<shape type=\"cube\"><bsdf type=\"mask\"/></shape>",
+      "<shape type=\"instance\"/>",
+      "<shape type=\"shapegroup\" id=\"g\"><shape type=\"instance\"><ref id=\"g\"/></shape></shape>",
+      "<bsdf type=\"mask\" id=\"a\"><ref id=\"b\"/></bsdf><bsdf type=\"mask\" id=\"b\"><ref id=\"a\"/></bsdf>",
+      "<bsdf type=\"diffuse\"><texture name=\"reflectance\" type=\"bitmap\"><string name=\"filename\" "
+      "value=\"broken.png\"/></texture></bsdf>",
+      "<emitter type=\"envmap\"><string name=\"filename\" value=\"broken.png\"/></emitter>",
+      "<emitter type=\"sunsky\"><float name=\"sun_scale\" value=\"-1\"/></emitter>",
+      "<emitter type=\"point\"><rgb name=\"intensity\" value=\"-1\"/></emitter>",
+      "<emitter type=\"area\"/>",
+      "<include filename=\"absent.xml\"/>",
+      "<path value=\"absent\"/>",
+      "<default name=\"a\"/>",
+      "<alias id=\"nobody\" as=\"somebody\"/>",
+      "<shape type=\"cube\" id=\"same\"/><shape type=\"cube\" id=\"same\"/>",
+      "<shape type=\"cube\"><boolean name=\"flip_normals\" value=\"$undefined\"/></shape>",
+      "<integrator type=\"path\"><integer name=\"max_depth\" value=\"deep\"/></integrator>",
+      "<integrator type=\"ao\"/>",
+      "<gizmo/>"};
+  for (const std::string& fault : faults) {
+    CAPTURE(fault);
+    const auto path = folder.write("test.xml", sceneOf("<shape type=\"sphere\" id=\"Kept\"/>" + fault));
+    CHECK_THROWS_AS(readScene(path), SceneError);
+    const Scene scene = readScene(path, lenient());
+    CHECK(!scene.warnings.empty());
+    CHECK(scene.shapes.at(0).name == "Kept");
+  }
+}
+
+TEST_CASE("scenes: lenient reading does without a parameter that is out of range") {
+  const auto alphaOf = [](const std::string& alpha) {
+    const Scene scene = readBody(
+        "<shape type=\"sphere\"><bsdf type=\"roughconductor\"><string name=\"distribution\" "
+        "value=\"ggx\"/>" +
+            alpha + "</bsdf></shape>",
+        lenient());
+    return scene.materials.at(0).bsdf->lobes()[0]->key();
+  };
+  CHECK(alphaOf("<float name=\"alpha\" value=\"-1\"/>") == alphaOf(""));
+  CHECK(alphaOf("<float name=\"alpha\" value=\"0.4\"/>") != alphaOf(""));
+  // The sky that is read again without its bad parameter is there once.
+  const auto skyOf = [](const std::string& scale) {
+    return readBody("<emitter type=\"sunsky\"><integer name=\"resolution\" value=\"16\"/>" + scale + "</emitter>",
+                    lenient())
+        .environment->radiance.at(3, 3)
+        .x();
+  };
+  CHECK(skyOf("<float name=\"sun_scale\" value=\"-1\"/>") == skyOf(""));
+}
+
+TEST_CASE("scenes: with nothing left to draw, lenient reading fails as well") {
+  CHECK_THAT(faultOf("<shape type=\"torus\"/>", lenient()), Catch::Contains("torus"));
+  CHECK_THAT(faultOfText("<scene version=\"3.0.0\"><shape type=\"sphere\"/></scene>", lenient()),
+             Catch::Contains("no <sensor>") && !Catch::Contains("--lenient"));
+}
+
+TEST_CASE("scenes: a check tells whether a scene can be read, and does not throw") {
+  CHECK(check(sceneOf("<shape type=\"sphere\"/>")).readable);
+  CHECK(!check(sceneOf("<shape type=\"sphere\"/><shape type=\"torus\"/>")).readable);
+  CHECK(check(sceneOf("<shape type=\"sphere\"/><shape type=\"torus\"/>"), true).readable);
+  const SceneCheck broken = check("<scene><shape</scene>");
+  REQUIRE(broken.faults.size() == 1);
+  CHECK(!broken.readable);
+  CHECK(check(sceneOf("<integrator type=\"volpath\"/><shape type=\"sphere\"/>")).notes.size() == 1);
+}
+
+TEST_CASE("scenes: left-over parameters are passed over in old files and named in new ones") {
+  const std::string body =
+      "<shape type=\"sphere\"><bsdf type=\"conductor\"><string name=\"material\" value=\"Al\"/>"
+      "<float name=\"alpha\" value=\"0.1\"/></bsdf></shape>";
+  const Scene scene = readText(oldSceneOf(body));
+  REQUIRE(scene.warnings.size() == 1);
+  CHECK_THAT(scene.warnings[0],
+             Catch::Contains("test.xml:2:81") && Catch::Contains("\"alpha\"") && Catch::Contains("it is ignored"));
+  CHECK_THAT(faultOf(body), Catch::Contains("\"alpha\"") && Catch::Contains("--lenient"));
+}
+
+TEST_CASE("scenes: of a parameter that is given twice the last one is used") {
+  const std::string body =
+      "<shape type=\"sphere\"><bsdf type=\"diffuse\"><float name=\"reflectance\" value=\"0.2\"/>"
+      "<float name=\"reflectance\" value=\"0.7\"/></bsdf></shape>";
+  for (const std::string& text : {oldSceneOf(body), sceneOf(body)}) {
+    const Scene scene = readText(text);
+    CHECK(albedoOf(scene, 0).x() == Approx(0.7f));
+    REQUIRE(scene.warnings.size() == 1);
+    CHECK_THAT(scene.warnings[0], Catch::Contains("test.xml:2:82") && Catch::Contains("given twice"));
+  }
+}
+
+TEST_CASE("scenes: a file whose name differs by case or slashes is found when there is only one") {
+  const TestFolder folder;
+  std::filesystem::create_directory(folder.path() / "Parts");
+  folder.write("Parts/Ball.xml", "<scene version=\"3.0.0\"><shape type=\"sphere\"/></scene>");
+  const auto read = [&](const std::string& name) {
+    return readScene(folder.write("test.xml", sceneOf("<include filename=\"" + name + "\"/>")));
+  };
+  for (const std::string name : {"parts/ball.xml", "Parts\\Ball.xml", "PARTS\\ball.XML"}) {
+    const Scene scene = read(name);
+    CHECK(scene.shapes.size() == 1);
+    REQUIRE(scene.warnings.size() == 1);
+    CHECK_THAT(scene.warnings[0], Catch::Contains("test.xml:2:1") && Catch::Contains("Parts/Ball.xml is taken for it"));
+  }
+  CHECK(read("Parts/Ball.xml").warnings.empty());
+  folder.write("Parts/BALL.xml", "<scene version=\"3.0.0\"/>");
+  CHECK_THROWS_WITH(read("Parts/ball.xml"), Catch::Contains("no file"));
+}
+
+TEST_CASE("scenes: files in other encodings are read, alone and included in each other") {
+  const TestFolder folder;
+  const std::string latin1 =
+      "<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?>\n<scene version=\"3.0.0\"><!-- Gr\xf6\xdf"
+      "e --><shape type=\"sphere\" id=\"Gr\xfcn\"/>\n<include filename=\"part.xml\"/>" +
+      std::string(kSensor) + "\n\xe4\n</scene>";
+  const std::string part =
+      "<scene version=\"3.0.0\">\n<shape type=\"cube\" id=\"Part\"/><shape type=\"torus\"/></scene>";
+  for (const std::string& included : {part, "\xef\xbb\xbf" + part, utf16(part, false, true), utf16(part, true, true),
+                                      utf16(part, false, false), utf16(part, true, false)}) {
+    folder.write("part.xml", included);
+    try {
+      readScene(folder.write("main.xml", latin1));
+      FAIL("the faults are not found");
+    } catch (const SceneError& error) {
+      REQUIRE(error.faults().size() == 2);
+      CHECK_THAT(error.faults()[0].where, Catch::EndsWith("part.xml:2:31"));
+      CHECK_THAT(error.faults()[1].where, Catch::EndsWith("main.xml:4:1"));
+      CHECK_THAT(error.faults()[1].message, Catch::Contains("\xc3\xa4"));
+    }
+    const Scene scene = readScene(folder.path() / "main.xml", lenient());
+    REQUIRE(scene.shapes.size() == 2);
+    CHECK(scene.shapes[0].name == "Gr\xc3\xbcn");
+    CHECK(scene.shapes[1].name == "Part");
+  }
+}
+
+TEST_CASE("scenes: an encoding that is not known or not kept is a fault of the file") {
+  CHECK_THAT(faultOfText("<?xml version='1.0' encoding='klingon'?><scene/>"),
+             Catch::Contains("test.xml:1:1") && Catch::Contains("\"klingon\" is not known"));
+  CHECK_THAT(faultOfText(std::string("\xff\xfe<\0s\0\x00\xd8", 8)), Catch::Contains("this is not UTF-16LE"));
+}
+
+TEST_CASE("scenes: small files that would multiply without end are refused") {
+  const std::string sphere = "<shape type=\"sphere\"/>";
+  std::string values = "<default name=\"a0\" value=\"0123456789\"/>";
+  for (int i = 1; i < 40; ++i) values += fmt::format("<default name=\"a{}\" value=\"$a{}$a{}\"/>", i, i - 1, i - 1);
+  CHECK_THAT(faultOf(values + sphere), Catch::Contains("a value is longer than 1048576 characters"));
+
+  const auto chain = [&](const std::string& element, const std::string& type, const std::string& leaf, int references) {
+    std::string body = fmt::format("<{} type=\"{}\" id=\"e0\"/>", element, leaf);
+    for (int i = 1; i <= 30; ++i) {
+      body += fmt::format("<{} type=\"{}\" id=\"e{}\">", element, type, i);
+      for (int j = 0; j < references; ++j) body += fmt::format("<ref name=\"color{}\" id=\"e{}\"/>", j, i - 1);
+      body += fmt::format("</{}>", element);
+    }
+    return body + sphere;
+  };
+  CHECK_THAT(faultOf(chain("bsdf", "blendbsdf", "diffuse", 2)), Catch::Contains("more than 1000 bsdfs nested in one"));
+  CHECK_THAT(faultOf(chain("texture", "checkerboard", "checkerboard", 2)),
+             Catch::Contains("more than 1000 textures nested in one"));
+  CHECK(faultOf(chain("bsdf", "twosided", "diffuse", 1)).empty());
+
+  std::string deep;
+  for (int i = 0; i < 100000; ++i)
+    deep += fmt::format("<bsdf type=\"twosided\" id=\"e{}\"><ref id=\"e{}\"/></bsdf>\n", i, i + 1);
+  deep += "<bsdf type=\"diffuse\" id=\"e100000\"/>";
+  CHECK_THAT(faultOf(deep + sphere), Catch::Contains("nested more than 100 deep"));
+
+  const TestFolder folder;
+  for (int i = 0; i < 40; ++i)
+    folder.write(
+        fmt::format("{}.xml", i),
+        fmt::format("<scene version=\"3.0.0\"><include filename=\"{0}.xml\"/><include filename=\"{0}.xml\"/></scene>",
+                    i + 1));
+  folder.write("40.xml", "<scene version=\"3.0.0\"/>");
+  CHECK_THROWS_WITH(readScene(folder.path() / "0.xml"), Catch::Contains("more than 1000 <include>s"));
+}
+
+TEST_CASE("scenes: integrators say how long paths are and whether emitters are seen") {
+  const auto read = [](const std::string& version, const std::string& integrator) {
+    return readText("<scene version=\"" + version + "\">" + integrator + kSensor + "</scene>");
+  };
+  CHECK(read("3.0.0", "<integrator type=\"path\"><integer name=\"max_depth\" value=\"0\"/></integrator>").maxDepth ==
+        0);
+  CHECK(read("3.0.0", "<integrator type=\"direct\"/>").maxDepth == 2);
+  CHECK(read("3.0.0", "<integrator type=\"path\"/>").emitterVisibility == EmitterVisibility::shown);
+  const std::string hide = "<integrator type=\"path\"><boolean name=\"hideEmitters\" value=\"true\"/></integrator>";
+  CHECK(read("3.0.0", hide).emitterVisibility == EmitterVisibility::hidden);
+  CHECK(read("0.6.0", hide).emitterVisibility == EmitterVisibility::dark);
+}
+
+TEST_CASE("scenes: clip planes are read and have to leave something between them") {
+  const auto cameraOf = [](const std::string& planes) {
+    return readText("<scene version=\"3.0.0\"><sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/>" +
+                    planes + "</sensor></scene>")
+        .camera;
+  };
+  const Camera camera = cameraOf("<float name=\"nearClip\" value=\"0.5\"/><float name=\"farClip\" value=\"7\"/>");
+  CHECK(camera.nearClip == 0.5f);
+  CHECK(camera.farClip == 7.0f);
+  CHECK(std::isinf(cameraOf("").farClip));
+  CHECK_THROWS_WITH(cameraOf("<float name=\"nearClip\" value=\"-1\"/>"), Catch::Contains("near_clip"));
+  CHECK_THROWS_WITH(cameraOf("<float name=\"nearClip\" value=\"3\"/><float name=\"farClip\" value=\"2\"/>"),
+                    Catch::Contains("far_clip"));
+}
+
+TEST_CASE("scenes: what fails because of a fault is no fault of its own") {
+  const auto faults = [](const std::string& body) { return check(sceneOf(body + "<shape type=\"cube\"/>")).faults; };
+  CHECK(faults("<shape type=\"instance\"><ref id=\"nobody\"/></shape>").size() == 1);
+  CHECK(faults("<bsdf type=\"mask\"><ref id=\"nobody\"/></bsdf>").size() == 1);
+  CHECK(faults("<bsdf type=\"diffuse\"><float name=\"reflectance\" value=\"$undefined\"/></bsdf>").size() == 1);
+  CHECK(faults("<bsdf type=\"mask\"/>").size() == 1);
+}
+
+TEST_CASE("scenes: a fault is counted once however many files are included after it") {
+  const TestFolder folder;
+  folder.write("part.xml", "<scene version=\"3.0.0\"/>");
+  const std::string include = "<include filename=\"part.xml\"/>";
+  const SceneCheck found =
+      checkScene(folder.write("test.xml", sceneOf("<default name=\"a\"/>" + include + include + include)));
+  REQUIRE(found.faults.size() == 1);
+  CHECK(found.faults[0].count == 1);
+}
+
+TEST_CASE("scenes: slips in the integrators we know are faults; the first of several integrators counts") {
+  CHECK_THAT(faultOf("<integrator type=\"path\"><integer name=\"max_dpeth\" value=\"3\"/></integrator>"),
+             Catch::Contains("did you mean max_depth?") && Catch::Contains("--lenient"));
+  CHECK(faultOf("<integrator type=\"guided_path\"><integer name=\"budget\" value=\"3\"/></integrator>").empty());
+  const Scene scene = readBody(
+      "<integrator type=\"path\"><integer name=\"max_depth\" value=\"3\"/></integrator><integrator type=\"path\"/>");
+  CHECK(scene.maxDepth == 3);
+  const Scene loose =
+      readBody("<integrator type=\"path\"><boolean name=\"strict_normals\" value=\"false\"/></integrator>");
+  REQUIRE(loose.warnings.size() == 1);
+  CHECK_THAT(loose.warnings[0], Catch::Contains("strict normals are always on"));
+}
+
+TEST_CASE("scenes: a saturated spectrum that reflects at most all light has no component over 1") {
+  const auto colour = [](const std::string& points) {
+    return albedoOf(readBody("<shape type=\"sphere\"><bsdf type=\"diffuse\"><spectrum name=\"reflectance\" value=\"" +
+                             points + "\"/></bsdf></shape>"),
+                    0);
+  };
+  const Rgb red = colour("360:0, 549:0, 550:1, 830:1");
+  CHECK(red.x() == 1.0f);
+  CHECK(red.y() == Approx(0.368).epsilon(0.02));
+  CHECK(colour("360:2, 830:2").x() == Approx(2.0f).epsilon(1e-3));
+}
+
+TEST_CASE("scenes: lenient reading says when nothing is left") {
+  CHECK_THAT(faultOf("<shape type=\"torus\"/>", lenient()), Catch::Contains("nothing is left to draw"));
+}
+
+}  // namespace lobe

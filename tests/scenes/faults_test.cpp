@@ -1,0 +1,254 @@
+// Faults in scene files: each is one line with the exact place, the offending text and what is known; and what lenient
+// reading makes of them.
+
+#include <catch2/catch.hpp>
+
+#include "tests/support/scenes_test_tools.h"
+
+namespace lobe {
+namespace {
+
+/// The fault is at LINE:COLUMN and its message contains all the parts.
+void checkFault(const std::string& fault, const std::string& place, std::initializer_list<std::string> parts) {
+  INFO(fault);
+  CHECK(fault.starts_with("test.xml:" + place + ": "));
+  CHECK(fault.find('\n') == std::string::npos);
+  for (const std::string& part : parts) {
+    INFO(part);
+    CHECK(fault.find(part) != std::string::npos);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("scenes: broken XML is told with its place") {
+  checkFault(faultOfText("<scene>\n  <shape type=\"obj\n</scene>\n"), "2:16", {"broken XML"});
+  checkFault(faultOfText("<scene>\n  <shape></shapes>\n</scene>\n"), "2:12", {"broken XML", "mismatch"});
+  checkFault(faultOfText(""), "1:1", {});
+  checkFault(faultOfText("<mesh/>"), "1:1", {"<mesh>", "<scene>"});
+  checkFault(faultOf("<shape type=\"disk\">\n some text</shape>"), "3:2", {"\"some\""});
+}
+
+TEST_CASE("scenes: a file that is not there is named") {
+  const TestFolder folder;
+  REQUIRE_THROWS_AS(readScene(folder.path() / "none.xml"), SceneError);
+  CHECK_THROWS_WITH(readScene(folder.path() / "none.xml"), Catch::Contains("none.xml"));
+  CHECK_THROWS_AS(readScene(folder.path()), SceneError);
+}
+
+TEST_CASE("scenes: unknown elements and types are told with what is known") {
+  checkFault(faultOf("\t<bdsf type=\"diffuse\"/>"), "2:2", {"<bdsf>", "bsdf", "shape"});
+  checkFault(faultOf("<shape type=\"disk\">\n  <flaot name=\"radius\" value=\"1\"/>\n</shape>"), "3:3",
+             {"<flaot>", "shape \"disk\"", "float"});
+  checkFault(faultOf("<shape type=\"disk\">\n  <bsdf type=\"velvet\"/>\n</shape>"), "3:3",
+             {"\"velvet\"", "roughplastic", "diffuse"});
+  checkFault(faultOf("\n <bsdf type=\"velvet\" id=\"NotUsed\"/>"), "3:2", {"\"velvet\""});
+  checkFault(faultOf("<shape type=\"torus\"/>"), "2:1",
+             {"\"torus\"", "cube, cylinder, disk, instance, obj, ply, rectangle, serialized, shapegroup, sphere"});
+  checkFault(faultOf("<emitter type=\"laser\"/>"), "2:1",
+             {"\"laser\"", "area, constant, directional, envmap, point, projector, sky, spot, sun, sunsky"});
+  checkFault(faultOf("<emitter type=\"area\"/>"), "2:1", {"inside a shape"});
+  checkFault(faultOf("<shape type=\"disk\"><emitter type=\"spot\"/></shape>"), "2:20", {"\"spot\"", "area"});
+  checkFault(faultOf("<texture type=\"wood\"/>"), "2:1", {"\"wood\"", "bitmap, checkerboard, scale"});
+  checkFault(faultOf("<shape/>"), "2:1", {"type"});
+  checkFault(faultOfText("<scene><sensor type=\"fisheye\"/></scene>"), "1:8",
+             {"\"fisheye\"", "perspective, thinlens, orthographic"});
+  checkFault(faultOf("<shape type=\"disk\"><transform name=\"to_world\"><shear/></transform></shape>"), "2:47",
+             {"<shear>", "translate, scale, rotate, lookat, matrix"});
+  checkFault(faultOfText("<scene/>"), "1:1", {"sensor"});
+}
+
+TEST_CASE("scenes: unknown parameters are told with their owner") {
+  checkFault(faultOf("<bsdf type=\"roughplastic\">\n\t<float name=\"foo\" value=\"1\"/>\n</bsdf>"), "3:2",
+             {"\"foo\"", "bsdf \"roughplastic\""});
+  checkFault(faultOf("<shape type=\"disk\">\n<float name=\"radius\" value=\"1\"/></shape>"), "3:1",
+             {"\"radius\"", "shape \"disk\""});
+  checkFault(faultOf("<emitter type=\"constant\"><float name=\"power\" value=\"1\"/></emitter>"), "2:26",
+             {"\"power\""});
+  checkFault(faultOf("<texture type=\"checkerboard\"><float name=\"size\" value=\"1\"/></texture>"), "2:30",
+             {"\"size\""});
+  checkFault(
+      faultOfText(
+          "<scene version=\"3.0.0\"><sensor type=\"perspective\"><float name=\"zoom\" value=\"1\"/></sensor></scene>"),
+      "1:51", {"\"zoom\""});
+  checkFault(faultOf("<shape type=\"disk\"><boolean name=\"flip_normals\" value=\"true\" vale=\"\"/></shape>"), "2:20",
+             {"vale", "name, value"});
+}
+
+TEST_CASE("scenes: wrong values are told with their text") {
+  const auto fault = [](const std::string& element) {
+    return faultOf("<bsdf type=\"roughplastic\">\n  " + element + "</bsdf>");
+  };
+  checkFault(fault("<float name=\"alpha\" value=\"0.1x\"/>"), "3:3", {"\"0.1x\"", "alpha"});
+  checkFault(fault("<float name=\"alpha\" value=\"\"/>"), "3:3", {"alpha"});
+  checkFault(fault("<float name=\"alpha\" value=\"nan\"/>"), "3:3", {"nan"});
+  checkFault(fault("<float name=\"alpha\" value=\"-1\"/>"), "3:3", {"alpha", "-1"});
+  checkFault(fault("<boolean name=\"nonlinear\" value=\"yes\"/>"), "3:3", {"\"yes\"", "true or false"});
+  checkFault(fault("<rgb name=\"diffuse_reflectance\" value=\"1, 2\"/>"), "3:3", {"\"1, 2\""});
+  checkFault(fault("<string name=\"alpha\" value=\"rough\"/>"), "3:3", {"alpha"});
+  checkFault(fault("<string name=\"distribution\" value=\"blinn\"/>"), "3:3", {"\"blinn\"", "beckmann, ggx"});
+  checkFault(fault("<spectrum name=\"diffuse_reflectance\" value=\"400:1, 400:2\"/>"), "3:3", {"400:1"});
+  checkFault(faultOf("<shape type=\"sphere\"><float name=\"radius\" value=\"-2\"/></shape>"), "2:22", {"radius", "-2"});
+  checkFault(faultOf("<shape type=\"sphere\"><transform name=\"to_world\"><scale x=\"2\"/></transform></shape>"),
+             "2:22", {"shape \"sphere\""});
+  checkFault(faultOf("<shape type=\"disk\"><transform name=\"to_world\"><translate x=\"a\"/></transform></shape>"),
+             "2:47", {"\"a\""});
+  checkFault(faultOf("<integrator type=\"path\"><integer name=\"max_depth\" value=\"deep\"/></integrator>"), "2:25",
+             {"deep"});
+  checkFault(
+      faultOfText("<scene><sensor type=\"perspective\"><film type=\"hdrfilm\"><integer name=\"width\" value=\"0\"/>"
+                  "</film></sensor></scene>"),
+      "1:56", {"width", "0"});
+  checkFault(faultOfText("<scene><sensor type=\"perspective\"><float name=\"fov\" value=\"180\"/></sensor></scene>"),
+             "1:35", {"180"});
+  checkFault(faultOfText("<scene><sensor type=\"perspective\"><string name=\"focal_length\" value=\"long\"/></sensor>"
+                         "</scene>"),
+             "1:35", {"long", "50mm"});
+}
+
+TEST_CASE("scenes: emitters without meaning are refused") {
+  const auto fault = [](const std::string& type, const std::string& body) {
+    return faultOf("<emitter type=\"" + type + "\">\n  " + body + "</emitter>");
+  };
+  checkFault(fault("point", "<rgb name=\"intensity\" value=\"1 -2 3\"/>"), "3:3", {"intensity", "negative", "-2"});
+  checkFault(fault("spot", "<float name=\"intensity\" value=\"-1\"/>"), "3:3", {"intensity", "negative"});
+  checkFault(fault("directional", "<float name=\"irradiance\" value=\"-1\"/>"), "3:3", {"irradiance", "negative"});
+  checkFault(fault("constant", "<float name=\"radiance\" value=\"-1\"/>"), "3:3", {"radiance", "negative"});
+  checkFault(fault("envmap", "<float name=\"scale\" value=\"-1\"/>"), "3:3", {"scale", "negative"});
+  checkFault(faultOf("<shape type=\"disk\"><emitter type=\"area\">\n<rgb name=\"radiance\" value=\"0 0 -1\"/></emitter>"
+                     "</shape>"),
+             "3:1", {"radiance", "negative", "-1"});
+  checkFault(fault("spot", "<float name=\"cutoffAngle\" value=\"0\"/>"), "3:3", {"cutoff_angle", "180"});
+  checkFault(fault("spot", "<float name=\"beamWidth\" value=\"25\"/>"), "3:3", {"beam_width", "20", "25"});
+  checkFault(fault("point", "<texture name=\"intensity\" type=\"checkerboard\"/>"), "3:3", {"intensity", "colour"});
+  checkFault(fault("directional", "<vector name=\"direction\" x=\"0\"/>"), "3:3", {"direction", "zero"});
+  checkFault(fault("point", "<point name=\"position\" x=\"1\"/><transform name=\"toWorld\"/>"), "3:33",
+             {"position", "to_world"});
+  checkFault(fault("directional", "<vector name=\"direction\" x=\"1\"/><transform name=\"toWorld\"/>"), "3:35",
+             {"direction", "to_world"});
+  checkFault(fault("point", "<float name=\"power\" value=\"1\"/>"), "3:3", {"\"power\"", "intensity"});
+}
+
+TEST_CASE("scenes: skies without meaning are refused") {
+  const auto fault = [](const std::string& type, const std::string& body) {
+    return faultOf("<emitter type=\"" + type + "\">\n  " + body + "</emitter>");
+  };
+  const std::string down = "<vector name=\"sunDirection\" x=\"1\" y=\"-1\"/>";
+  for (const std::string type : {"sky", "sun", "sunsky"}) {
+    checkFault(fault(type, down), "3:3", {"45.0 degrees below the horizon"});
+    checkFault(fault(type, "<float name=\"hour\" value=\"23\"/>"), "3:3", {"below the horizon"});
+    checkFault(fault(type, "<float name=\"turbidity\" value=\"11\"/>"), "3:3", {"turbidity", "1 to 10", "11"});
+    checkFault(fault(type, "<float name=\"scale\" value=\"-1\"/>"), "3:3", {"scale", "negative"});
+    checkFault(fault(type, "<float name=\"stretch\" value=\"3\"/>"), "3:3", {"stretch", "1 to 2"});
+    checkFault(fault(type, "<integer name=\"month\" value=\"13\"/>"), "3:3", {"month", "1 to 12"});
+    checkFault(fault(type, "<vector name=\"sunDirection\" y=\"1\"/><float name=\"hour\" value=\"9\"/>"), "3:38",
+               {"sun_direction", "hour"});
+    checkFault(fault(type, "<float name=\"haze\" value=\"1\"/>"), "3:3", {"\"haze\"", "turbidity"});
+    checkFault(faultOf("<emitter type=\"constant\"/>\n<emitter type=\"" + type + "\"/>"), "3:1",
+               {"second environment"});
+    checkFault(faultOf("<emitter type=\"" + type + "\"/>\n<emitter type=\"constant\"/>"), "3:1",
+               {"second environment"});
+  }
+  checkFault(fault("sunsky", "<float name=\"sunScale\" value=\"-1\"/>"), "3:3", {"sun_scale", "negative"});
+  checkFault(fault("sun", "<float name=\"sunRadiusScale\" value=\"1e3\"/>"), "3:3", {"sun_radius_scale"});
+  checkFault(fault("sunsky", "<boolean name=\"complex_sun\" value=\"true\"/>"), "3:3", {"complex_sun", "disc"});
+  checkFault(fault("sky", "<boolean name=\"extend\" value=\"true\"/>"), "3:3", {"extend", "horizon"});
+  CHECK(fault("sunsky", "<boolean name=\"complex_sun\" value=\"false\"/><boolean name=\"extend\" value=\"false\"/>") ==
+        "");
+}
+
+TEST_CASE("scenes: cameras and crops without meaning are refused") {
+  const auto fault = [](const std::string& type, const std::string& body) {
+    return faultOfText("<scene version=\"3.0.0\"><sensor type=\"" + type + "\">\n" + body + "</sensor></scene>");
+  };
+  checkFault(fault("thinlens", ""), "1:24", {"aperture_radius"});
+  checkFault(fault("thinlens", "<float name=\"apertureRadius\" value=\"-1\"/>"), "2:1", {"aperture_radius", "-1"});
+  checkFault(
+      fault("thinlens", "<float name=\"apertureRadius\" value=\"1\"/>\n<float name=\"focusDistance\" value=\"0\"/>"),
+      "3:1", {"focus_distance", "0"});
+  checkFault(fault("orthographic", "<float name=\"fov\" value=\"40\"/>"), "2:1", {"\"fov\""});
+  const std::string film = "<film type=\"hdrfilm\"><integer name=\"width\" value=\"100\"/>\n";
+  checkFault(fault("perspective", film + "<integer name=\"cropOffsetX\" value=\"100\"/></film>"), "3:1",
+             {"crop_offset_x", "0 to 99"});
+  checkFault(fault("perspective", film + "<integer name=\"cropWidth\" value=\"91\"/>"
+                                         "<integer name=\"cropOffsetX\" value=\"10\"/></film>"),
+             "3:1", {"crop_width", "1 to 90", "91"});
+}
+
+TEST_CASE("scenes: missing and damaged files are told with both names") {
+  const TestFolder folder;
+  const auto fault = [&](const std::string& body) {
+    try {
+      readScene(folder.write("test.xml", sceneOf(body)));
+    } catch (const SceneError& error) {
+      return std::string(error.what()).substr(folder.path().string().size() + 1);
+    }
+    return std::string();
+  };
+  folder.write("broken.ply", "ply\nformat ascii 1.0\n");
+  folder.write("broken.png", "not a picture");
+  checkFault(fault("<shape type=\"obj\">\n  <string name=\"filename\" value=\"no such.obj\"/></shape>"), "3:3",
+             {(folder.path() / "no such.obj").string()});
+  checkFault(fault("<shape type=\"ply\"><string name=\"filename\" value=\"broken.ply\"/></shape>"), "2:19",
+             {"broken.ply"});
+  checkFault(fault("<shape type=\"obj\"/>"), "2:1", {"filename"});
+  const auto texture = [](const std::string& file) {
+    return "<bsdf type=\"diffuse\"><texture name=\"reflectance\" type=\"bitmap\">\n <string name=\"filename\" "
+           "value=\"" +
+           file + "\"/></texture></bsdf>";
+  };
+  checkFault(fault(texture("none.png")), "3:2", {(folder.path() / "none.png").string()});
+  checkFault(fault(texture("broken.png")), "3:2", {"broken.png"});
+  checkFault(fault("<emitter type=\"envmap\"><string name=\"filename\" value=\"sky.exr\"/></emitter>"), "2:24",
+             {"sky.exr"});
+}
+
+TEST_CASE("scenes: undefined names and references are told") {
+  checkFault(faultOf("<default name=\"b\" value=\"1\"/>\n<bsdf type=\"diffuse\">"
+                     "<float name=\"reflectance\" value=\"$a\"/></bsdf>"),
+             "3:22", {"$a", "defined are b"});
+  checkFault(faultOf("<shape type=\"disk\">\n<ref id=\"Gold\"/></shape>"), "3:1", {"\"Gold\""});
+  checkFault(faultOf("<bsdf type=\"diffuse\" id=\"A\"/>\n<bsdf type=\"diffuse\" id=\"A\"/>"), "3:1", {"\"A\"", ":2:1"});
+}
+
+TEST_CASE("scenes: groups and instances that make no sense are refused") {
+  const auto group = [](const std::string& inside) {
+    return "<shape type=\"shapegroup\" id=\"g\">" + inside + "</shape>";
+  };
+  CHECK_THAT(faultOf("<shape type=\"instance\"/>"), Catch::Contains("2:1") && Catch::Contains("<ref> to a shapegroup"));
+  CHECK_THAT(faultOf("<shape type=\"instance\"><shape type=\"cube\"/></shape>"), Catch::Contains("one shapegroup"));
+  CHECK_THAT(faultOf(group("<shape type=\"sphere\"><emitter type=\"area\"/></shape>")), Catch::Contains("cannot emit"));
+  CHECK_THAT(faultOf(group("<shape type=\"shapegroup\"/>")), Catch::Contains("plain shapes only"));
+  CHECK_THAT(faultOf(group("") + "<shape type=\"instance\"><ref id=\"g\"/><transform name=\"toWorld\"><scale x=\"0\"/>"
+                                 "</transform></shape>"),
+             Catch::Contains("singular"));
+}
+
+TEST_CASE("scenes: a cylinder without length is refused") {
+  CHECK_THAT(faultOf("<shape type=\"cylinder\">\n<point name=\"p1\" x=\"0\" y=\"0\" z=\"0\"/></shape>"),
+             Catch::Contains("3:1") && Catch::Contains("must differ"));
+}
+
+TEST_CASE("scenes: lenient reading replaces what it does not know and warns once per kind") {
+  const Scene scene = readBody(
+      "<shape type=\"torus\"/><shape type=\"torus\"/>"
+      "<shape type=\"sphere\" id=\"Kept\"><bsdf type=\"velvet\"><float name=\"fuzz\" value=\"1\"/></bsdf></shape>"
+      "<shape type=\"obj\"><string name=\"filename\" value=\"none.obj\"/></shape>"
+      "<shape type=\"disk\"><bsdf type=\"twosided\"><bsdf type=\"diffuse\"><texture name=\"reflectance\" "
+      "type=\"bitmap\">"
+      "<string name=\"filename\" value=\"none.png\"/></texture></bsdf></bsdf>"
+      "<float name=\"shine\" value=\"1\"/></shape>"
+      "<emitter type=\"laser\"/><gizmo/>",
+      lenient());
+  REQUIRE(scene.shapes.size() == 2);
+  CHECK(scene.shapes[0].name == "Kept");
+  CHECK(std::holds_alternative<Disk>(scene.shapes[1].geometry));
+  for (const Shape& shape : scene.shapes) {
+    const BsdfPtr& bsdf = scene.materials.at(static_cast<std::size_t>(shape.material)).bsdf;
+    CHECK((bsdf->albedo(Vec3::UnitZ(), Vec2(0, 0)) == 0.5f).all());
+  }
+  CHECK(scene.warnings.size() == 7);
+  for (const std::string& warning : scene.warnings) CHECK(warning.find("test.xml:2:") != std::string::npos);
+}
+
+}  // namespace lobe

@@ -1,0 +1,235 @@
+// Mesh parameters of scene files, and the material libraries of OBJ files.
+
+#include <catch2/catch.hpp>
+
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "tests/support/scenes_test_tools.h"
+
+using namespace lobe;
+using Catch::Matchers::Contains;
+
+namespace {
+
+const Vec3 kUp = Vec3::UnitZ();
+
+/// Groups, each a square of side 1 of its own material, and one of a material that the library does not have.
+const std::string kSquares =
+    "mtllib colours.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0.25 0.25\n"
+    "g left\nusemtl red\nf 1/1 2/1 3/1 4/1\ng right\nusemtl green\nf 1/1 2/1 3/1 4/1\nusemtl unknown\nf 1/1 2/1 3/1\n";
+const std::string kRedAndGreen = "newmtl red\nKd 1 0 0\nillum 1\nnewmtl green\nKd 0 0.5 0\n";
+
+std::string sceneOfObj(const std::string& content, const std::string& version = "0.6.0") {
+  return "<scene version=\"" + version + "\">\n<shape type=\"obj\"><string name=\"filename\" value=\"a.obj\"/>" +
+         content + "</shape>\n" + kSensor + "\n</scene>\n";
+}
+
+class ObjScene {
+ public:
+  explicit ObjScene(const std::string& library, const std::string& obj = kSquares) {
+    folder.write("a.obj", obj);
+    if (!library.empty()) folder.write("colours.mtl", library);
+  }
+  Scene read(const std::string& content = "", const std::string& version = "0.6.0") const {
+    return readScene(folder.write("test.xml", sceneOfObj(content, version)));
+  }
+
+  TestFolder folder;
+};
+
+const Bsdf& bsdfOf(const Scene& scene, std::size_t shape) {
+  return *scene.materials.at(static_cast<std::size_t>(scene.shapes.at(shape).material)).bsdf;
+}
+
+Rgb albedoOf(const Scene& scene, std::size_t shape) {
+  return bsdfOf(scene, shape).albedo(kUp, Vec2(0.25f, 0.25f));
+}
+
+/// The BSDF of a material, applied to the first of the squares.
+BsdfPtr bsdfOfMtl(const std::string& statements) {
+  const Scene scene = ObjScene("newmtl red\n" + statements).read();
+  return scene.materials.at(static_cast<std::size_t>(scene.shapes.at(0).material)).bsdf;
+}
+
+bool isNear(const Rgb& a, const Rgb& b, float tolerance = 1e-5f) {
+  return (a - b).abs().maxCoeff() <= tolerance;
+}
+
+/// A BMP of a single pixel.
+std::string onePixel(unsigned char red, unsigned char green, unsigned char blue) {
+  std::string bytes("BM\x3a\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\1\0\0\0\1\0\0\0\1\0\x18\0\0\0\0\0\4\0\0\0", 38);
+  bytes += std::string(16, '\0');
+  for (const unsigned char c : {blue, green, red}) bytes += static_cast<char>(c);
+  return bytes + '\0';
+}
+
+}  // namespace
+
+TEST_CASE("scenes: an OBJ of an older file has the materials of its library") {
+  const Scene scene = ObjScene(kRedAndGreen).read();
+  REQUIRE(scene.shapes.size() == 3);
+  CHECK(scene.shapes[0].name == "a.obj:red");
+  CHECK(isNear(albedoOf(scene, 0), Rgb(1, 0, 0)));
+  // Colours are encoded as sRGB, as Mitsuba 0.6 takes them.
+  CHECK(isNear(albedoOf(scene, 1), Rgb(0, static_cast<float>(std::pow((0.5 + 0.055) / 1.055, 2.4)), 0)));
+  CHECK(isNear(albedoOf(scene, 2), grey(0.5f)));
+  CHECK(scene.warnings.empty());
+  CHECK(scene.notes.empty());
+}
+
+TEST_CASE("scenes: an OBJ's library is left alone where something else gives the materials") {
+  const ObjScene files(kRedAndGreen);
+  const std::string grey3 = "type=\"diffuse\"><rgb name=\"reflectance\" value=\"0.3\"/></bsdf>";
+  const Scene whole = files.read("<bsdf " + grey3);
+  REQUIRE(whole.shapes.size() == 1);
+  CHECK(isNear(albedoOf(whole, 0), grey(0.3f)));
+  const Scene named = files.read("<bsdf name=\"green\" " + grey3);
+  REQUIRE(named.shapes.size() == 3);
+  CHECK(named.shapes[0].name == "a.obj:green");
+  CHECK(isNear(albedoOf(named, 0), grey(0.3f)));
+  CHECK(isNear(albedoOf(named, 1), Rgb(1, 0, 0)));
+  CHECK(files.read("<boolean name=\"loadMaterials\" value=\"false\"/>").shapes.size() == 1);
+  CHECK(files.read("", "3.0.0").shapes.size() == 1);
+  CHECK(files.read("<boolean name=\"load_materials\" value=\"true\"/>", "3.0.0").shapes.size() == 3);
+}
+
+TEST_CASE("scenes: a shape index chooses among an OBJ's meshes") {
+  const ObjScene files(kRedAndGreen);
+  const auto indexed = [](int index) { return fmt::format("<integer name=\"shapeIndex\" value=\"{}\"/>", index); };
+  for (const auto& [index, colour] : {std::pair(0, Rgb(1, 0, 0)), std::pair(2, grey(0.5f))}) {
+    const Scene scene = files.read(indexed(index));
+    REQUIRE(scene.shapes.size() == 1);
+    CHECK(isNear(albedoOf(scene, 0), colour));
+    CHECK(std::get<TriangleMesh>(scene.shapes[0].geometry).triangles.size() == (index == 0 ? 2 : 1));
+  }
+  CHECK(files.read(indexed(-1)).shapes.size() == 3);
+  CHECK_THAT(faultOfText(sceneOfObj(indexed(-2))), Contains("test.xml:2:58: ") && Contains("shape_index"));
+  CHECK_THROWS_WITH(files.read(indexed(3)), Contains("there is no mesh 3"));
+}
+
+TEST_CASE("scenes: a collapsed OBJ has the material that it names last") {
+  const ObjScene files(kRedAndGreen + "newmtl unknown\nKd 0 0 1\n");
+  const Scene scene = files.read("<boolean name=\"collapse\" value=\"true\"/>");
+  REQUIRE(scene.shapes.size() == 1);
+  CHECK(isNear(albedoOf(scene, 0), Rgb(0, 0, 1)));
+  CHECK(std::get<TriangleMesh>(scene.shapes[0].geometry).triangles.size() == 5);
+}
+
+TEST_CASE("scenes: the illumination models of an MTL become BSDFs as in Mitsuba 0.6") {
+  const Vec3 wi = Vec3(0.3f, 0.2f, 0.8f).normalized();
+  const Vec3 mirrored(-wi.x(), -wi.y(), wi.z());
+  const std::string phong = "Kd 0.5 0.5 0.5\nKs 0.25 0.25 0.25\nNs 20\n";
+  const auto decoded = [](double x) { return std::pow((x + 0.055) / 1.055, 2.4); };
+  const double diffuse = decoded(0.5) / std::numbers::pi;
+  // (n + 2) / 2π in the mirror direction, Kd/π everywhere.
+  const double peak = diffuse + decoded(0.25) * 22 / (2 * std::numbers::pi);
+  CHECK(bsdfOfMtl(phong + "illum 2\n")->eval(wi, mirrored, {0, 0}).y() == Approx(peak).epsilon(1e-4));
+  // Model 2 without highlights is diffuse, as are 0, 1 and 3.
+  for (const std::string& text :
+       {phong + "Ns 0\nillum 2\n", phong + "Ks 0 0 0\nillum 2\n", phong + "illum 1\n", phong + "illum 3\n", phong})
+    CHECK(bsdfOfMtl(text)->eval(wi, mirrored, {0, 0}).y() == Approx(diffuse).epsilon(1e-5));
+  for (const int glass : {4, 6, 7, 9}) {
+    const BsdfPtr bsdf = bsdfOfMtl(phong + fmt::format("illum {}\n", glass));
+    CHECK(bsdf->sampleDelta(kUp, {0, 0}, 0.999f)->wi.z() == Approx(-1));  // light passes
+  }
+  for (const int metal : {5, 8}) {
+    const BsdfPtr bsdf = bsdfOfMtl(phong + fmt::format("illum {}\n", metal));
+    const auto reflected = bsdf->sampleDelta(kUp, {0, 0}, 0.5f);
+    REQUIRE(reflected);
+    CHECK(reflected->wi.z() == Approx(1));
+    CHECK((reflected->weight > 0.88f && reflected->weight < 0.94f).all());  // aluminium
+  }
+}
+
+TEST_CASE("scenes: opacity, images and bumps of an MTL") {
+  const ObjScene files(
+      "newmtl red\nKd 1 1 1\nd 0.25\nnewmtl green\nmap_Kd maps\\half grey.bmp\nnewmtl unknown\nmap_d gone.bmp\n"
+      "map_Kd -s 2 2 2 grey.bmp\n");
+  std::filesystem::create_directory(files.folder.path() / "maps");
+  files.folder.write("maps/half grey.bmp", onePixel(188, 0, 255));
+  files.folder.write("grey.bmp", onePixel(255, 255, 255));
+  const Scene scene = files.read();
+  REQUIRE(scene.shapes.size() == 3);
+  CHECK(isNear(bsdfOf(scene, 0).eval(kUp, kUp, {0, 0}), grey(0.25f / std::numbers::pi_v<float>)));
+  CHECK(isNear(albedoOf(scene, 1), Rgb(0.5029f, 0, 1), 1e-3f));
+  // An image that is not there is black, here opacity: nothing is left of the surface.
+  CHECK(isNear(bsdfOf(scene, 2).eval(kUp, kUp, {0, 0}), Rgb::Zero()));
+  REQUIRE(scene.warnings.size() == 2);
+  CHECK_THAT(scene.warnings[0], Contains("options of the image") && Contains("line 8"));
+  CHECK_THAT(scene.warnings[1], Contains("test.xml:2:") && Contains("gone.bmp is not there: black is used"));
+}
+
+TEST_CASE("scenes: a bump of an MTL tilts the normal") {
+  const ObjScene files("newmtl red\nKd 1 1 1\nbump slope.bmp\n");
+  // Two pixels, black and white: between their centres the height rises by 1 in half of the image.
+  std::string slope = onePixel(0, 0, 0);
+  slope[18] = 2;
+  slope.resize(54);
+  slope += std::string("\0\0\0\xff\xff\xff\0\0", 8);
+  files.folder.write("slope.bmp", slope);
+  const Scene scene = files.read();
+  const Vec3 normal = bsdfOf(scene, 0).perturbedNormal(Vec3::UnitZ(), {0.5f, 0.5f}, Vec3::UnitX(), Vec3::UnitY());
+  CHECK(normal.z() == Approx(1 / std::sqrt(5)).epsilon(1e-3));
+  CHECK(normal.x() == Approx(-2 / std::sqrt(5)).epsilon(1e-3));
+}
+
+// As sRGB, 0.9 is 0.787 and 0.6 is 0.319.
+TEST_CASE("scenes: colours of an MTL that exceed 1 in sum are scaled, with a warning") {
+  const ObjScene files("newmtl red\nKd 0.9 0 0\nKs 0.6 0 0\nNs 10\nillum 2\n");
+  const Scene scene = files.read();
+  REQUIRE(scene.warnings.size() == 1);
+  CHECK_THAT(scene.warnings[0],
+             Catch::Contains("the sum of specular_reflectance and diffuse_reflectance is up to 1.106"));
+  CHECK(bsdfOf(scene, 0).albedo(Vec3::UnitZ(), {0.5f, 0.5f}).x() == Approx(0.99f));
+}
+
+TEST_CASE("scenes: a library that is not there or damaged is warned of") {
+  const Scene absent = ObjScene("").read();
+  REQUIRE(absent.warnings.size() == 1);
+  CHECK_THAT(absent.warnings[0], Contains("test.xml:2:19: ") && Contains("colours.mtl: no such file"));
+  REQUIRE(absent.shapes.size() == 1);
+  CHECK(isNear(albedoOf(absent, 0), grey(0.5f)));
+  const Scene damaged = ObjScene("newmtl red\nKd one 0 0\n").read();
+  REQUIRE(damaged.warnings.size() == 1);
+  CHECK_THAT(damaged.warnings[0], Contains("colours.mtl: line 2: \"one\" is no number"));
+}
+
+TEST_CASE("scenes: maxSmoothAngle is read, but not with flat faces") {
+  const std::string folded = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 0 1 1\nf 1 2 3 4\nf 5 1 4 6\n";
+  const ObjScene files("", folded);
+  const auto angle = [](int degrees) { return fmt::format("<float name=\"maxSmoothAngle\" value=\"{}\"/>", degrees); };
+  const auto vertices = [&](const std::string& content) {
+    return std::get<TriangleMesh>(files.read(content).shapes.at(0).geometry).positions.size();
+  };
+  CHECK(vertices("") == 6);
+  CHECK(vertices(angle(100)) == 6);
+  CHECK(vertices(angle(30)) == 8);
+  CHECK_THROWS_WITH(files.read(angle(30) + "<boolean name=\"faceNormals\" value=\"true\"/>"),
+                    Contains("either face_normals or max_smooth_angle"));
+  CHECK_THROWS_WITH(files.read(angle(181)), Contains("between 0 and 180"));
+}
+
+TEST_CASE("scenes: things too far away are refused at their place") {
+  const auto moved = [](const std::string& type, const std::string& to) {
+    return "<" + type + "><transform name=\"to_world\"><translate x=\"" + to + "\"/></transform></";
+  };
+  const std::string limit = "over 1e+15";
+  CHECK_THAT(faultOf(moved("shape type=\"sphere\"", "1e16") + "shape>"),
+             Contains("test.xml:2:22: ") && Contains(limit));
+  CHECK_THAT(faultOf(moved("shape type=\"disk\"", "1e16") + "shape>"), Contains(limit));
+  CHECK_THAT(faultOf(moved("shape type=\"cylinder\"", "1e16") + "shape>"), Contains(limit));
+  CHECK_THAT(faultOf(moved("shape type=\"rectangle\"", "-1e16") + "shape>"), Contains(limit));
+  CHECK_THAT(faultOf(moved("emitter type=\"point\"", "1e16") + "emitter>"), Contains(limit));
+  CHECK_THAT(faultOf(moved("emitter type=\"spot\"", "1e16") + "emitter>"), Contains(limit));
+  CHECK_THAT(faultOf("<emitter type=\"point\"><point name=\"position\" x=\"1e16\" y=\"0\" z=\"0\"/></emitter>"),
+             Contains("test.xml:2:23: ") && Contains(limit));
+  CHECK_THAT(faultOf(moved("sensor type=\"perspective\"", "3e18") + "sensor>"), Contains(limit));
+  const std::string group = "<shape type=\"shapegroup\" id=\"g\"><shape type=\"cube\"/></shape>";
+  const std::string instance = "<shape type=\"instance\"><ref id=\"g\"/><transform name=\"to_world\"><scale value=\"";
+  CHECK_THAT(faultOf(group + instance + "1e16\"/></transform></shape>"),
+             Contains("test.xml:2:61: ") && Contains(limit));
+  CHECK(faultOf(group + instance + "1e-30\"/></transform></shape>") == "");
+}

@@ -1,0 +1,56 @@
+#pragma once
+// Whether two pictures may be estimates of the same light: a z-test over blocks of pixels.
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "runtime/render/film/film.h"
+
+namespace lobe::test {
+
+struct Block {
+  double mean = 0, variance = 0;
+};
+
+/// Means over blocks of pixels and channels, with the variance of that estimate.
+inline std::vector<Block> blocks(const Film& film, int size) {
+  const Image mean = film.mean(), variance = film.varianceOfMean();
+  std::vector<Block> all;
+  for (int y0 = 0; y0 + size <= film.height(); y0 += size)
+    for (int x0 = 0; x0 + size <= film.width(); x0 += size) {
+      Block block;
+      for (int y = y0; y < y0 + size; ++y)
+        for (int x = x0; x < x0 + size; ++x) {
+          block.mean += mean.at(x, y).mean() / (size * size);
+          // Channels go up and down together: the standard deviation of their mean is at most the mean of theirs.
+          const double deviation = variance.at(x, y).sqrt().mean();
+          block.variance += deviation * deviation / std::pow(size, 4);
+        }
+      all.push_back(block);
+    }
+  return all;
+}
+
+/// No block further apart than chance allows among so many (Šidák, at 0.1 %), and not all of them together. Blocks
+/// without variance have to be equal.
+inline bool agree(const std::vector<Block>& a, const std::vector<Block>& b) {
+  double worst = 0, sumA = 0, sumB = 0, variance = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double v = a[i].variance + b[i].variance;
+    const double difference = std::abs(a[i].mean - b[i].mean);
+    if (difference > 0) worst = std::max(worst, difference / std::sqrt(v));
+    sumA += a[i].mean;
+    sumB += b[i].mean;
+    variance += v;
+  }
+  const double together = sumA == sumB ? 0 : std::abs(sumA - sumB) / std::sqrt(variance);
+  const double chance = std::erfc(worst / std::sqrt(2.0));  // of one block, both sides
+  const double level = 1 - std::pow(1 - 0.001, 1.0 / static_cast<double>(a.size()));
+  UNSCOPED_INFO("worst " << worst << ", together " << together << ", ratio " << sumA / sumB);
+  return chance > level && together < 3.3;
+}
+
+}  // namespace lobe::test

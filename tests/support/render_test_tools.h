@@ -1,0 +1,150 @@
+#pragma once
+// Scenes made in code, plain materials and statistics for the render tests.
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include <catch2/catch.hpp>
+
+#include "runtime/core/sampling.h"
+#include "runtime/render/integrators/path_integrator.h"
+#include "tests/support/tool_run.h"
+
+namespace lobe::test {
+
+/// Lambert on both sides.
+class Diffuse : public Bsdf {
+ public:
+  explicit Diffuse(float albedo) : albedo_(albedo) {}
+  Rgb eval(const Vec3& wo, const Vec3& wi, const Vec2&) const override {
+    return wo.z() * wi.z() > 0 ? grey(albedo_ * kInvPi) : Rgb(Rgb::Zero());
+  }
+  std::optional<BsdfSample> sample(const Vec3& wo, const Vec2& uv, float, const Vec2& u) const override {
+    Vec3 wi = squareToCosineHemisphere(u);
+    if (wi.z() <= 0) return std::nullopt;
+    if (wo.z() < 0) wi.z() = -wi.z();
+    return BsdfSample{wi, eval(wo, wi, uv), pdf(wo, wi, uv)};
+  }
+  float pdf(const Vec3& wo, const Vec3& wi, const Vec2&) const override {
+    return wo.z() * wi.z() > 0 ? std::abs(wi.z()) * kInvPi : 0;
+  }
+  LobeMixture mixture(const Vec3&, const Vec2&) const override { return {{}, 0, albedo_}; }
+  Rgb albedo(const Vec3&, const Vec2&) const override { return grey(albedo_); }
+
+ private:
+  float albedo_;
+};
+
+/// Half of the time a perfect mirror of reflectance `mirror`, else Lambert; the delta share is what it is told to be.
+class HalfMirror : public Diffuse {
+ public:
+  HalfMirror(float albedo, float mirror, float fraction) : Diffuse(albedo), mirror_(mirror), fraction_(fraction) {}
+  std::optional<DeltaSample> sampleDelta(const Vec3& wo, const Vec2&, float) const override {
+    return DeltaSample{{-wo.x(), -wo.y(), wo.z()}, grey(mirror_), 1.0f};
+  }
+  float deltaProbability(const Vec3&, const Vec2&) const override { return fraction_; }
+
+ private:
+  float mirror_, fraction_;
+};
+
+/// The rectangle a, a+u, a+u+v, a+v; its front is that of u × v.
+inline TriangleMesh rectangle(const Vec3& a, const Vec3& u, const Vec3& v) {
+  TriangleMesh mesh;
+  mesh.positions = {a, a + u, a + u + v, a + v};
+  mesh.uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  return mesh;
+}
+
+/// A closed axis-aligned box with its front outside, or inside.
+inline TriangleMesh box(const Vec3& low, const Vec3& high, bool inward) {
+  TriangleMesh mesh;
+  for (int i = 0; i < 8; ++i)
+    mesh.positions.push_back({i & 1 ? high.x() : low.x(), i & 2 ? high.y() : low.y(), i & 4 ? high.z() : low.z()});
+  mesh.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
+                    {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+  if (inward)
+    for (auto& t : mesh.triangles) std::swap(t[1], t[2]);
+  return mesh;
+}
+
+/// A mesh of a sphere, with the sphere's normals: triangles at all angles.
+inline TriangleMesh sphereMesh(const Vec3& centre, float radius, int rings) {
+  TriangleMesh mesh;
+  for (int i = 0; i <= rings; ++i)
+    for (int j = 0; j <= 2 * rings; ++j) {
+      const float theta = kPi * i / rings, phi = kPi * j / rings;
+      const Vec3 n(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta));
+      mesh.positions.push_back(centre + radius * n);
+      mesh.normals.push_back(n);
+    }
+  const auto stride = static_cast<std::uint32_t>(2 * rings + 1);
+  for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(rings); ++i)
+    for (std::uint32_t j = 0; j + 1 < stride; ++j) {
+      const std::uint32_t a = i * stride + j, b = a + stride;
+      mesh.triangles.push_back({a, b, b + 1});
+      mesh.triangles.push_back({a, b + 1, a + 1});
+    }
+  return mesh;
+}
+
+inline int addMaterial(Scene& scene, BsdfPtr bsdf) {
+  scene.materials.push_back({"test", std::move(bsdf)});
+  return static_cast<int>(scene.materials.size()) - 1;
+}
+
+inline Shape& addShape(Scene& scene, Geometry geometry, int material) {
+  scene.shapes.push_back({"test", std::move(geometry), material, std::nullopt});
+  return scene.shapes.back();
+}
+
+inline void addEmitter(Scene& scene, Geometry geometry, float radiance, int material = -1) {
+  addShape(scene, std::move(geometry), material).emitter = AreaEmitter{constantTexture(grey(radiance))};
+}
+
+inline Environment environment(Image image) {
+  return {std::move(image), Eigen::Matrix3f::Identity()};
+}
+
+/// Mean and error of numbers that are added.
+class Moments {
+ public:
+  void add(double x) {
+    ++n_;
+    const double d = x - mean_;
+    mean_ += d / n_;
+    squares_ += d * (x - mean_);
+  }
+  double mean() const { return mean_; }
+  double error() const { return std::sqrt(squares_ / (n_ - 1.0) / n_); }
+
+ private:
+  double n_ = 0, mean_ = 0, squares_ = 0;
+};
+
+/// How many standard errors the mean is from the truth; a part in 10⁵ is left to rounding.
+inline double deviation(const Moments& m, double truth) {
+  return std::abs(m.mean() - truth) / std::hypot(m.error(), 1e-5 * truth);
+}
+/// The same for two estimates of one number.
+inline double deviation(const Moments& a, const Moments& b) {
+  return std::abs(a.mean() - b.mean()) / std::hypot(a.error(), b.error(), 1e-5 * a.mean());
+}
+/// Chance exceeds it once in 15 000 times.
+inline constexpr double kMaxDeviation = 4.0;
+
+/// Green channel of n estimates along one ray.
+inline Moments estimate(const Integrator& integrator, const Ray& ray, int n, std::uint64_t seed = 7) {
+  Moments moments;
+  PathStatistics statistics;
+  for (int i = 0; i < n; ++i) {
+    Rng rng(seed, 0, i);
+    moments.add(integrator.radiance(ray, rng, statistics).y());
+  }
+  return moments;
+}
+
+}  // namespace lobe::test

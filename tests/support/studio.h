@@ -1,0 +1,76 @@
+#pragma once
+// A scene with its caches and its trained illumination, as tests render it.
+
+#include <optional>
+
+#include "fitter/compile.h"
+#include "runtime/guiding/field_data.h"
+#include "runtime/render/integrators/path_integrator.h"
+#include "runtime/render/integrators/renderer.h"
+#include "runtime/render/training/training.h"
+#include "scenes/camera.h"
+#include "scenes/mitsuba/reader.h"
+#include "scenes/scene_lobes.h"
+#include "tests/support/tool_run.h"
+
+namespace lobe::test {
+
+/// Everything that rendering a scene by every integrator takes, with coarse caches and little training: estimates have
+/// to be right however rough the mixtures are.
+class Studio {
+ public:
+  explicit Studio(Scene s, int width, int height) : scene_(std::move(s)) {
+    scene_.camera.width = width;
+    scene_.camera.height = height;
+    scene_.camera.horizontalFov = horizontalFov(scene_.camera, width, height);
+    renderScene_.emplace(scene_);
+    camera_.emplace(scene_.camera, scene_.filter);
+    CompileOptions options;
+    options.directory = folder_ / "lobes";
+    options.settings.samples = 512;
+    options.settings.components = 4;
+    options.elevations = 12;
+    options.directions = 48;
+    for (const CompileJob& job : planCompile(collectLobes(scene_), options)) runCompile(job, [] {});
+    caches_.emplace(options.directory, lobeRequests(scene_), "lobefit");
+    TrainingPlan plan;
+    plan.passes = 3;
+    plan.photons = 20000;
+    plan.importons = 8000;
+    plan.seed = 5;
+    illumination_ = trainIllumination(*renderScene_, *camera_, &*caches_, plan).field;
+    guided_.emplace(scene_, illumination_, nullptr);
+    product_.emplace(scene_, illumination_, &*caches_);
+  }
+
+  Film render(const Integrator& integrator, int samples, std::uint64_t seed) const {
+    Film film(camera_->width(), camera_->height());
+    lobe::render(*camera_, integrator, film, {seed, samples, std::nullopt});
+    return film;
+  }
+
+  PathIntegrator path() const { return {*renderScene_, {}}; }
+  GuidedIntegrator guided() const { return {*renderScene_, {}, *guided_}; }
+  GuidedIntegrator product() const { return {*renderScene_, {}, *product_}; }
+  GuidedIntegrator plainProduct() const {
+    PathOptions options;
+    options.russianRoulette = RussianRoulette::throughput;
+    return {*renderScene_, options, *product_};
+  }
+  const RenderScene& renderScene() const { return *renderScene_; }
+  const Scene& scene() const { return scene_; }
+  const GuidedSampler& productSampler() const { return *product_; }
+  const IlluminationCache& illumination() const { return cacheOf(illumination_); }
+  std::filesystem::path lobes() const { return folder_ / "lobes"; }
+
+ private:
+  Folder folder_;
+  Scene scene_;
+  std::optional<RenderScene> renderScene_;
+  std::optional<RayCamera> camera_;
+  std::optional<LobeCacheSet> caches_;
+  Field illumination_;
+  std::optional<GuidedSampler> guided_, product_;
+};
+
+}  // namespace lobe::test

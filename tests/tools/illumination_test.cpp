@@ -1,0 +1,189 @@
+// Illumination kept in files: train once, render elsewhere, in parts.
+
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
+
+#include "runtime/image/image.h"
+#include "runtime/image/image_output.h"
+#include "tests/support/loberender_test_tools.h"
+
+using namespace lobe;
+using namespace lobe::test;
+
+namespace {
+
+const std::string kSave = "loberender scene.xml --spp 2 -o trained.exr --save-illumination a.illum" + kTraining;
+
+}  // namespace
+
+TEST_CASE("loberender: what was trained once renders the same picture again") {
+  const SceneFolder folder(true);
+  for (const std::string integrator : {" --integrator product", " --integrator guided"}) {
+    REQUIRE(folder.run(kSave + integrator + " --threads 2").code == 0);
+    const std::string stored = folder.bytes("a.illum");
+    const ToolRun restored =
+        folder.run("loberender scene.xml --spp 2 -o again.exr --stats s.json --illumination a.illum" + integrator);
+    CAPTURE(restored.error);
+    REQUIRE(restored.code == 0);
+    CHECK(folder.bytes("again.exr") == folder.bytes("trained.exr"));
+    const auto s = nlohmann::json::parse(folder.bytes("s.json"));
+    CHECK((s.at("seconds_training") == 0 && s.at("training_passes").empty() && s.at("records") > 0));
+
+    REQUIRE(folder.run(kSave + integrator + " --threads 1").code == 0);
+    CHECK(folder.bytes("a.illum") == stored);
+    REQUIRE(folder.run(kSave + integrator + " --seed 2").code == 0);
+    CHECK(folder.bytes("a.illum") != stored);
+  }
+}
+
+TEST_CASE("loberender: product says when its illumination has learnt no shares") {
+  const SceneFolder folder(true);
+  const std::string note = "have learnt no BSDF sampling fractions";
+  const auto noteOf = [&](const std::string& integrator) {
+    return folder.run("loberender scene.xml --spp 1 -o a.exr --illumination a.illum --integrator " + integrator).error;
+  };
+  REQUIRE(folder.run(kSave).code == 0);
+  const std::string learnt = folder.bytes("a.illum");
+  CHECK_THAT(noteOf("product"), !Catch::Contains(note));
+  REQUIRE(folder.run(kSave + " --bsdf-fraction fixed").code == 0);
+  CHECK(folder.bytes("a.illum") != learnt);
+  CHECK_THAT(noteOf("product"), Catch::Contains(note));
+  REQUIRE(folder.run(kSave + " --integrator guided").code == 0);
+  CHECK_THAT(noteOf("product"), Catch::Contains(note));
+  CHECK_THAT(noteOf("guided"), !Catch::Contains(note));
+
+  const std::string unused =
+      "loberender scene.xml --spp 1 -o a.exr --bsdf-fraction fixed --passes 1 --photons 100 --importons 100 "
+      "--integrator ";
+  CHECK_THAT(folder.run(unused + "path").error,
+             Catch::Contains("path has no use for --passes, --photons, --importons, --bsdf-fraction"));
+  CHECK_THAT(folder.run(unused + "guided").error, Catch::Contains("guided has no use for --bsdf-fraction"));
+  CHECK_THAT(folder.run(unused + "product").error, !Catch::Contains("no use for"));
+}
+
+TEST_CASE("loberender: illumination serves other cameras of a scene, and no other scene") {
+  const SceneFolder folder(false);
+  const std::string guided = " --integrator guided --spp 1";
+  REQUIRE(folder.run(kSave + " --integrator guided").code == 0);
+  const std::string use = "loberender other.xml -o a.exr --illumination a.illum" + guided;
+  std::string text = kScene;
+  folder.write("other.xml", text.replace(text.find("value=\"50\""), 10, "value=\"60\""));
+  CHECK(folder.run(use + " --size 8x6 --seed 5").code == 0);
+
+  text.replace(text.find("value=\"0.15\""), 12, "value=\"0.16\"");
+  folder.write("other.xml", text);
+  CHECK_THAT(fault(folder, use, 1), Catch::Contains("a.illum: trained for another scene") &&
+                                        Catch::Contains("/scene.xml") && Catch::Contains("--save-illumination"));
+}
+
+TEST_CASE("loberender: illumination that is no such file is refused in words") {
+  const SceneFolder folder(true);
+  REQUIRE(folder.run(kSave).code == 0);
+  const std::string whole = folder.bytes("a.illum");
+  const std::string use = "loberender scene.xml --spp 1 -o b.exr --illumination a.illum";
+  std::string flipped = whole, newer = whole;
+  flipped[whole.size() / 2] = static_cast<char>(~flipped[whole.size() / 2]);
+  newer[8] = 99;
+  const std::vector<std::pair<std::string, std::string>> cases{{whole.substr(0, whole.size() / 2), "truncated"},
+                                                               {flipped, "damaged"},
+                                                               {newer, "newer than this program's"},
+                                                               {readFile(folder.caches().front()), "of kind 'BRDF'"},
+                                                               {"", "empty"}};
+  for (const auto& [bytes, word] : cases) {
+    folder.write("a.illum", bytes);
+    CHECK_THAT(fault(folder, use, 1), Catch::Contains("a.illum: ") && Catch::Contains(word));
+  }
+  CHECK_THAT(fault(folder, use + "none", 1), Catch::Contains("a.illumnone: cannot open"));
+}
+
+TEST_CASE("loberender: options that contradict a file of illumination") {
+  const SceneFolder folder(false);
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {" --illumination a.illum --passes 1", "--passes"},
+      {" --illumination a.illum --train paths", "--train"},
+      {" --illumination a.illum --components 4", "--components"},
+      {" --illumination a.illum --train-seconds 1", "--train-seconds"},
+      {" --illumination a.illum --bsdf-fraction fixed", "--bsdf-fraction"},
+      {" --bsdf-fraction all", "--bsdf-fraction"},
+      {" --components 9", "--components"},
+      {" --photons 0", "--photons"},
+      {" --illumination a.illum --save-illumination b.illum", "--save-illumination"},
+      {" --illumination a.illum --integrator path", "path has none"},
+      {" --save-illumination a.illum --integrator path", "path has none"},
+      {" --save-illumination a.exr", "a.exr"},
+      {" --sample-offset -1", "--sample-offset"},
+      {" --sample-offset 2147483647", "at most 2147483647"}};
+  for (const auto& [options, word] : cases)
+    CHECK_THAT(fault(folder, "loberender scene.xml --spp 1 -o a.exr" + options, 2), Catch::Contains(word));
+  CHECK_THAT(fault(folder, "loberender scene.xml --seconds 1 -o a.exr --sample-offset 1", 2), Catch::Contains("--spp"));
+  CHECK_THAT(fault(folder, "loberender scene.xml --spp 1 -o a.exr --save-illumination none/a.illum", 1),
+             Catch::Contains("cannot write"));
+}
+
+TEST_CASE("loberender: parts of a picture merge to the whole") {
+  const SceneFolder folder(false);
+  const std::string render = "loberender scene.xml --integrator guided --illumination a.illum";
+  REQUIRE(folder.run(kSave + " --integrator guided").code == 0);
+  REQUIRE(folder.run(render + " --spp 8 -o whole.exr").code == 0);
+  REQUIRE(folder.run(render + " --spp 3 -o a.exr").code == 0);
+  REQUIRE(folder.run(render + " --spp 4 --sample-offset 3 -o b.exr").code == 0);
+  REQUIRE(folder.run(render + " --spp 1 --sample-offset 7 -o c.exr").code == 0);
+  // Two of them first: what was merged can be merged again.
+  REQUIRE(folder.run("lobecompare --merge bc.exr c.exr b.exr").code == 0);
+  REQUIRE(folder.run("lobecompare --merge merged.exr a.exr bc.exr").code == 0);
+
+  const Image whole = readImage(folder / "whole.exr"), merged = readImage(folder / "merged.exr");
+  REQUIRE(whole.pixels.size() == merged.pixels.size());
+  float worst = 0;
+  for (std::size_t i = 0; i < whole.pixels.size(); ++i)
+    worst = std::max(worst, ((whole.pixels[i] - merged.pixels[i]) / (whole.pixels[i] + 1e-3f)).abs().maxCoeff());
+  CHECK(worst < 1e-6f);
+  CHECK(readAttributes(folder / "merged.exr") == readAttributes(folder / "whole.exr"));
+  CHECK(folder.bytes("a.exr") != folder.bytes("c.exr"));
+
+  const ToolRun overlap = folder.run("lobecompare --merge d.exr a.exr whole.exr");
+  CHECK(overlap.code == 1);
+  CHECK_THAT(overlap.error, Catch::Contains("a.exr and whole.exr: both have samples 0 to 2 of seed 1 by guided"));
+  CHECK_FALSE(folder.has("d.exr"));
+
+  REQUIRE(folder.run("loberender scene.xml --integrator path --spp 1 --size 4x4 -o other.exr").code == 0);
+  const ToolRun mixed = folder.run("lobecompare --merge d.exr a.exr other.exr");
+  CHECK(mixed.code == 1);
+  CHECK_THAT(mixed.error, Catch::Contains("of different scenes or cameras"));
+  CHECK_THAT(folder.run("lobecompare --merge d.exr a.exr none.exr").error, Catch::Contains("none.exr: no such file"));
+}
+
+TEST_CASE("lobedump: shows illumination to people, machines and viewers of points") {
+  const SceneFolder folder(true);
+  REQUIRE(folder.run(kSave).code == 0);
+  const ToolRun text = folder.run("lobedump a.illum");
+  CHECK(text.code == 0);
+  CHECK_THAT(text.out,
+             Catch::Contains("/scene.xml, hash") && Catch::Contains("from both, 1 passes of 2000 photons and 1000") &&
+                 Catch::Contains("radius") && Catch::Contains("undersampled") && Catch::Contains("learnt shares"));
+  const auto json = nlohmann::json::parse(folder.run("lobedump --json a.illum").out).at(0);
+  const long records = json.at("record_count");
+  REQUIRE(records > 1);
+  CHECK(json.at("bytes") == folder.bytes("a.illum").size());
+  CHECK(static_cast<double>(json.at("bytes")) < 600.0 * static_cast<double>(records) + 2000);
+  CHECK((json.at("settings").at("seed") == 1 && json.at("settings").at("from") == "both"));
+  CHECK(json.at("settings").at("learnt_fractions") == true);
+  CHECK_FALSE(json.contains("records"));
+  const auto& radius = json.at("distributions").at("radius");
+  CHECK((radius.at("min") > 0 && radius.at("min") <= radius.at("median") && radius.at("max") <= json.at("unit")));
+  const auto all = nlohmann::json::parse(folder.run("lobedump --json --records a.illum").out).at(0);
+  CHECK(static_cast<long>(all.at("records").size()) == records);
+  CHECK(lineCount(folder.run("lobedump --records a.illum").out) == lineCount(text.out) + records + 1);
+
+  REQUIRE(folder.run("lobedump a.illum --points p.ply").code == 0);
+  const std::string ply = folder.bytes("p.ply"), end = "end_header\n";
+  CHECK_THAT(ply, Catch::StartsWith("ply\n") && Catch::Contains("element vertex " + std::to_string(records) + "\n"));
+  CHECK(ply.size() == ply.find(end) + end.size() + static_cast<std::size_t>(records) * 10 * sizeof(float));
+
+  const std::string lobe = folder.caches().front().string();
+  CHECK(folder.run("lobedump a.illum " + lobe).code == 2);
+  CHECK(folder.run("lobedump --points p.ply " + lobe).code == 2);
+  CHECK(folder.run("lobedump --points p.obj a.illum").code == 2);
+  CHECK(folder.run("lobedump --diff a.illum a.illum").code == 2);
+  CHECK(folder.run("lobedump gone.illum").code == 1);
+}

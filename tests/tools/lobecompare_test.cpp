@@ -1,0 +1,81 @@
+// lobecompare as its users see it: output, exit codes, one-line errors.
+
+#include <filesystem>
+#include <string>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "runtime/image/image_output.h"
+#include "tests/support/render_test_tools.h"
+
+using namespace lobe;
+using namespace lobe::test;
+
+namespace {
+
+ToolRun lobecompare(const std::string& arguments) {
+  return runBinary(".", "lobecompare " + arguments);
+}
+
+}  // namespace
+
+TEST_CASE("render: lobecompare tells errors to people and machines") {
+  const Folder folder;
+  const std::string reference = folder / "reference.exr", image = folder / "image.exr";
+  writeImage(reference, Image(10, 10, grey(0.5f)));
+  writeImage(image, Image(10, 10, grey(0.6f)));
+  SECTION("numbers") {
+    const ToolRun run = lobecompare(reference + " " + image + " " + reference + " --json");
+    REQUIRE(run.code == 0);
+    const auto json = nlohmann::json::parse(run.out);
+    REQUIRE(json.size() == 2);
+    CHECK(json[0]["image"] == image);
+    CHECK(json[0]["mse"].get<double>() == Approx(0.01));
+    CHECK(json[0]["relmse"].get<double>() == Approx(0.01 / 0.26));
+    CHECK(json[0]["relmse_drop_0.1pct"].get<double>() == Approx(0.01 / 0.26));
+    CHECK(json[0]["relmse_drop_1pct"].get<double>() == Approx(0.01 / 0.26));
+    CHECK(json[0]["mean_ratio"].get<double>() == Approx(1.2));
+    CHECK(json[0]["nonfinite"] == 0);
+    CHECK(json[1]["mse"] == 0);
+    CHECK(lobecompare(reference + " " + image).out.find("0.01") != std::string::npos);
+  }
+  SECTION("map") {
+    const std::string map = folder / "map.png";
+    CHECK(lobecompare(reference + " " + image + " --map " + map).code == 0);
+    CHECK(readImage(map).width == 10);
+    CHECK(lobecompare(reference + " " + image + " " + image + " --map " + map).code == 2);
+    CHECK(lobecompare(reference + " " + image + " --map map.jpg").code == 2);
+    const ToolRun unwritable = lobecompare(reference + " " + image + " --map /nowhere/map.png");
+    CHECK(unwritable.code == 1);
+    CHECK(unwritable.error.find("lobecompare: error: /nowhere/map.png: cannot write") == 0);
+  }
+  SECTION("a larger reference is averaged down") {
+    const std::string large = folder / "large.exr";
+    Image pixels(20, 20);
+    for (int y = 0; y < 20; ++y)
+      for (int x = 0; x < 20; ++x) pixels.at(x, y) = grey((x + y) % 2 == 0 ? 0.2f : 0.8f);
+    writeImage(large, pixels);
+    const ToolRun run = lobecompare(large + " " + image + " --shrink 2 --json");
+    REQUIRE(run.code == 0);
+    CHECK(nlohmann::json::parse(run.out)[0]["mse"].get<double>() == Approx(0.01));
+    const ToolRun uneven = lobecompare(large + " " + image + " --shrink 3");
+    CHECK(uneven.code == 1);
+    CHECK(uneven.error == fmt::format("lobecompare: error: {}: 20x20 pixels are not squares of 3 a side\n", large));
+    CHECK(lobecompare(large + " " + image + " --shrink 0").code == 2);
+  }
+  SECTION("faults") {
+    CHECK(lobecompare("").code == 2);
+    CHECK(lobecompare(reference).code == 2);
+    CHECK(lobecompare(reference + " " + image + " --unknown").code == 2);
+    const std::string other = folder / "other.exr";
+    writeImage(other, Image(9, 10));
+    const ToolRun sizes = lobecompare(reference + " " + other);
+    CHECK(sizes.code == 1);
+    CHECK(sizes.error ==
+          fmt::format("lobecompare: error: {}: the image has 9x10 pixels, the reference 10x10\n", other));
+    const ToolRun missing = lobecompare(reference + " " + (folder / "missing.exr").string());
+    CHECK(missing.code == 1);
+    CHECK(missing.error.find("missing.exr") != std::string::npos);
+  }
+}

@@ -1,0 +1,332 @@
+// loberender as its users see it: from a scene file to pictures, statistics and one-line errors.
+
+#include <filesystem>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <ImfDoubleAttribute.h>
+#include <ImfHeader.h>
+#include <ImfInputFile.h>
+#include <ImfStringAttribute.h>
+#include <fmt/format.h>
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
+
+#include "runtime/image/image.h"
+#include "schema/lobe_cache.h"
+#include "tests/support/loberender_test_tools.h"
+
+using namespace lobe;
+using namespace lobe::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+double number(const Imf::Header& header, const char* name) {
+  return header.typedAttribute<Imf::DoubleAttribute>(name).value();
+}
+
+}  // namespace
+
+TEST_CASE("loberender and lobefit: what the scene has and we replace is noted") {
+  const SceneFolder folder(false);
+  std::string text = kScene;
+  text.insert(text.find("<sensor"), "<integrator type=\"volpath\"/>");
+  folder.write("scene.xml", text);
+  for (const std::string tool : {"loberender", "lobefit"}) {
+    const ToolRun run =
+        folder.run(tool == "lobefit" ? kQuickFit : "loberender scene.xml -o a.exr --integrator path --spp 1");
+    CAPTURE(run.error);
+    CHECK(run.error.starts_with(tool + ": note: integrator \"volpath\" is replaced"));
+  }
+}
+
+TEST_CASE("loberender: missing caches are named with the command that makes them") {
+  const SceneFolder folder(false);
+  const std::string line = fault(folder, kRender, 1);
+  CHECK_THAT(line, Catch::Contains("Steel, Iron") && Catch::Contains("Satin") && Catch::Contains(".lobe: missing"));
+  const std::size_t command = line.find("run: lobefit ");
+  REQUIRE(command != std::string::npos);
+  const ToolRun fit = folder.run(line.substr(command + 5, line.size() - command - 6));
+  CAPTURE(fit.error);
+  REQUIRE(fit.code == 0);
+  const ToolRun run = folder.run(kRender);
+  CAPTURE(run.error);
+  CHECK(run.code == 0);
+  CHECK(run.out.empty());
+  CHECK(readImage(folder / "a.exr").width == 16);
+}
+
+TEST_CASE("loberender: the command that makes the caches is one that a shell takes") {
+  const SceneFolder folder(false);
+  std::string scene = kScene;
+  scene.replace(scene.find("0.15"), 4, "$roughness");
+  folder.write("it's a scene.xml", scene);
+  const std::string render = R"(loberender "it's a scene.xml" -o a.exr --spp 1 --cache "my lobes" -D "roughness= 0.2")";
+  const std::string line = fault(folder, render + kTraining, 1);
+  const std::size_t command = line.find("run: lobefit ");
+  REQUIRE(command != std::string::npos);
+  const std::string fit = line.substr(command + 5, line.size() - command - 6);
+  CAPTURE(fit);
+  CHECK(folder.run(fit + " --elevations 4 --samples 256").code == 0);
+  CHECK(folder.run(render + kTraining).code == 0);
+}
+
+TEST_CASE("loberender: a cache of another version of the lobe is stale") {
+  const SceneFolder folder(true);
+  const fs::path path = folder.caches().front();
+  std::vector<std::byte> bytes;
+  {
+    const LobeCache cache = LobeCache::open(path);
+    LobeCacheInfo info = cache.info();
+    ++info.modelRevision;
+    std::vector<std::uint32_t> lookup;
+    for (std::uint32_t i = 0; i < info.gridCount; ++i) lookup.push_back(cache.lookup(i));
+    bytes = encodeLobeCache(info, cache.records(), cache.components(), lookup);
+  }
+  writeAtomically(path, std::span<const std::byte>(bytes));
+  const std::string line = fault(folder, kRender, 1);
+  CHECK_THAT(line, Catch::Contains(path.filename().string() + ": stale") && Catch::Contains("run: lobefit"));
+  CHECK(folder.run(kQuickFit).code == 0);
+  CHECK(folder.run(kRender).code == 0);
+}
+
+TEST_CASE("loberender: damaged caches are refused in words") {
+  const SceneFolder folder(true);
+  const fs::path path = folder.caches().front();
+  const std::string whole = readFile(path);
+  const auto flipped = [&](std::size_t offset, int bit) {
+    std::string bytes = whole;
+    bytes[offset] = static_cast<char>(bytes[offset] ^ (1 << bit));
+    return bytes;
+  };
+  std::string newer = whole;
+  newer[8] = 99;
+  const std::vector<std::pair<std::string, std::string>> cases{{whole.substr(0, whole.size() / 2), "truncated"},
+                                                               {whole.substr(0, 10), "truncated"},
+                                                               {flipped(whole.size() / 2, 3), "damaged"},
+                                                               {flipped(24, 0), "damaged"},
+                                                               {newer, "version"},
+                                                               {"", "empty"},
+                                                               {std::string(1000, 'x'), "not a"}};
+  for (const auto& [bytes, word] : cases) {
+    writeAtomically(path, bytes);
+    CHECK_THAT(fault(folder, kRender, 1), Catch::Contains(path.filename().string()) && Catch::Contains(word));
+  }
+  CHECK(folder.run(kQuickFit).code == 0);
+  CHECK(folder.run(kRender).code == 0);
+}
+
+TEST_CASE("loberender: faults of the scene are named by file, line and column") {
+  const SceneFolder folder(false);
+  const auto lineOf = [&](const std::string& scene) {
+    folder.write("bad.xml", "<scene version='0.6.0'><sensor type='perspective'/>\n" + scene + "\n</scene>");
+    return fault(folder, "loberender bad.xml -o a.exr --spp 1", 1);
+  };
+  CHECK_THAT(lineOf("<bsdf type='diffuse'>"), Catch::Contains("bad.xml:3:3: broken XML"));
+  CHECK_THAT(lineOf("<shape type='obj'><string name='filename' value='gone.obj'/></shape>"),
+             Catch::Contains("bad.xml:2:") && Catch::Contains("gone.obj"));
+  CHECK_THAT(lineOf("<bsdf type='diffuse' id='a'><texture type='bitmap' name='reflectance'>"
+                    "<string name='filename' value='gone.png'/></texture></bsdf>"),
+             Catch::Contains("bad.xml:2:") && Catch::Contains("gone.png"));
+  CHECK_THAT(fault(folder, "loberender gone.xml -o a.exr --spp 1", 1), Catch::Contains("gone.xml"));
+}
+
+TEST_CASE("loberender: what makes no sense on the command line") {
+  const SceneFolder folder(false);
+  const std::vector<std::pair<std::string, std::string>> cases{{"", "--spp"},
+                                                               {" --spp 1 --seconds 1", "--spp"},
+                                                               {" --spp 0", "--spp"},
+                                                               {" --spp -3", "--spp"},
+                                                               {" --spp many", "--spp"},
+                                                               {" --seconds 0", "--seconds"},
+                                                               {" --seconds nan", "--seconds"},
+                                                               {" --seconds inf", "--seconds"},
+                                                               {" --spp 1 --size 16", "--size"},
+                                                               {" --spp 1 --size 0x12", "--size"},
+                                                               {" --spp 1 --size 16x12x3", "--size"},
+                                                               {" --spp 1 --size 1000000x1000000", "--size"},
+                                                               {" --spp 1 --max-depth 0", "--max-depth"},
+                                                               {" --spp 1 --seed -1", "--seed"},
+                                                               {" --spp 1 --seed 18446744073709551616", "--seed"},
+                                                               {" --spp 1 --integrator 1", "path,guided,product"},
+                                                               {" --spp 1 --reference a.exr", "--convergence"},
+                                                               {" --spp 1 --convergence a.csv", "--reference"},
+                                                               {" --spp 1 --integrator magic", "--integrator"},
+                                                               {" --spp 1 --components 9", "components"},
+                                                               {" --spp 1 --passes -1", "passes"},
+                                                               {" --seconds 1 --train-seconds 1", "--train-seconds"},
+                                                               {" --spp 1 --passes 0", "--passes"},
+                                                               {" --spp 1 --threads 0", "--threads"},
+                                                               {" --spp 1 -o b.jpg", "b.jpg"},
+                                                               {" --spp 1 -o a.exr", "a.exr"},
+                                                               {" --spp 1 --stats scene.xml", "scene.xml"},
+                                                               {" --spp 1 --unknown", "--unknown"}};
+  for (const auto& [options, word] : cases)
+    CHECK_THAT(fault(folder, "loberender scene.xml -o a.exr" + options, 2), Catch::Contains(word));
+  fault(folder, "loberender", 2);
+  fault(folder, "loberender scene.xml --spp 1", 2);
+}
+
+TEST_CASE("loberender: files that cannot be written are refused before the work") {
+  const SceneFolder folder(false);
+  folder.write("reference.exr", "not read yet");
+  // So many samples that a check after the work would never come.
+  const std::string render = "loberender scene.xml --integrator path --spp 1000000000";
+  const auto refused = [&](const std::string& options) {
+    CHECK_THAT(fault(folder, render + options, 1), Catch::Contains("cannot write"));
+  };
+  refused(" -o none/a.exr");
+  refused(" -o a.exr -o none/a.png");
+  refused(" -o scene.xml/a.exr");
+  refused(" -o a.exr --stats none/stats.json");
+  refused(" -o a.exr --stats .");
+  refused(" -o a.exr --reference reference.exr --convergence none/a.csv");
+}
+
+TEST_CASE("loberender: a reference has to be a picture of the same size") {
+  const SceneFolder folder(false);
+  const std::string render = "loberender scene.xml --integrator path --spp 1";
+  REQUIRE(folder.run(render + " --size 8x6 -o small.exr").code == 0);
+  const std::string measured = render + " -o a.exr --convergence a.csv --reference ";
+  CHECK_THAT(fault(folder, measured + "small.exr", 1),
+             Catch::Contains("8x6") && Catch::Contains("16x12") && Catch::Contains("small.exr"));
+  CHECK_THAT(fault(folder, measured + "gone.exr", 1), Catch::Contains("gone.exr"));
+}
+
+TEST_CASE("loberender: the same bytes for any number of threads, with what they came from") {
+  const SceneFolder folder(true);
+  const std::string render = "loberender scene.xml --spp 4 --seed 9" + kTraining;
+  REQUIRE(folder.run(render + " --threads 1 -o one.exr").code == 0);
+  REQUIRE(folder.run(render + " --threads 2 -o two.exr").code == 0);
+  REQUIRE(folder.run(render + " --threads 2 -o again.exr").code == 0);
+  CHECK(folder.bytes("one.exr").size() > 500);
+  CHECK(folder.bytes("one.exr") == folder.bytes("two.exr"));
+  CHECK(folder.bytes("two.exr") == folder.bytes("again.exr"));
+  REQUIRE(folder.run(render + "1 -o other.exr").code == 0);  // more importons
+  CHECK(folder.bytes("other.exr") != folder.bytes("one.exr"));
+
+  const Imf::InputFile file((folder / "one.exr").c_str());
+  CHECK(number(file.header(), "seed") == 9);
+  CHECK(number(file.header(), "samples") == 4);
+  CHECK(file.header().findTypedAttribute<Imf::DoubleAttribute>("seconds") == nullptr);
+  const std::string hashes = file.header().typedAttribute<Imf::StringAttribute>("cacheHashes").value();
+  CHECK(hashes.size() == 2 * 16 + 1);
+  for (const fs::path& cache : folder.caches())
+    CHECK_THAT(hashes, Catch::Contains(fmt::format("{:016x}", LobeCache::open(cache).hash())));
+}
+
+TEST_CASE("loberender: statistics, convergence and pictures of a run") {
+  const SceneFolder folder(true);
+  REQUIRE(folder.run("loberender scene.xml --integrator path --spp 8 --seed 2 -o reference.exr").code == 0);
+  const std::set<std::string> before = folder.names();
+  const ToolRun run = folder.run(
+      "loberender scene.xml --seconds 0.5 -o a.exr -o a.png --stats s.json --reference reference.exr --convergence "
+      "c.csv" +
+      kTraining);
+  CAPTURE(run.error);
+  REQUIRE(run.code == 0);
+
+  SECTION("nothing else is written") {
+    std::set<std::string> expected = before;
+    expected.insert({"a.exr", "a.png", "s.json", "c.csv"});
+    CHECK(folder.names() == expected);
+  }
+  SECTION("statistics") {
+    const auto s = nlohmann::json::parse(folder.bytes("s.json"));
+    const double training = s.at("seconds_training"), rendering = s.at("seconds_rendering");
+    CHECK(s.at("integrator") == "product");
+    CHECK(training > 0);
+    CHECK(rendering > 0);
+    CHECK(s.at("seconds_total").get<double>() == Approx(training + rendering));
+    CHECK(s.at("spp") >= 1);
+    CHECK(s.at("rays") >= s.at("path_segments"));
+    CHECK(s.at("path_segments") >= s.at("spp").get<int>() * 16 * 12);
+    CHECK(s.at("segments_per_second").get<double>() == Approx(s.at("path_segments").get<double>() / rendering));
+    CHECK(s.at("mean_path_length") >= 1);
+    CHECK(s.at("peak_rss_bytes") > 1e6);
+    CHECK(s.at("records") > 0);
+    CHECK(s.at("record_bytes") > s.at("records"));
+    std::uintmax_t lobes = 0;
+    for (const fs::path& cache : folder.caches()) lobes += fs::file_size(cache);
+    CHECK(s.at("lobe_bytes") == lobes);
+    CHECK(s.at("nonfinite_samples") == 0);
+    double sum = 0;
+    for (const auto& fraction : s.at("strategy_fractions")) sum += fraction.get<double>();
+    CHECK(sum == Approx(1));
+  }
+  SECTION("convergence") {
+    std::istringstream csv(folder.bytes("c.csv"));
+    std::string line;
+    std::getline(csv, line);
+    CHECK(line == "seconds,spp,mse,relmse,relmse_drop_0.1pct,relmse_drop_1pct,mean_ratio");
+    double seconds = 0;
+    int samples = 0, lines = 0;
+    while (std::getline(csv, line)) {
+      double s = 0, mse = 0;
+      int n = 0;
+      REQUIRE(std::sscanf(line.c_str(), "%lf,%d,%lf", &s, &n, &mse) == 3);
+      CHECK((s >= seconds && n > samples && mse > 0));
+      seconds = s;
+      samples = n;
+      ++lines;
+    }
+    CHECK(lines >= 2);
+    CHECK(seconds > 0);
+  }
+  SECTION("pictures") {
+    const Image exr = readImage(folder / "a.exr"), png = readImage(folder / "a.png");
+    CHECK((png.width == 16 && png.height == 12));
+    double difference = 0;
+    for (std::size_t i = 0; i < exr.pixels.size(); ++i)
+      difference = std::max<double>(difference, (exr.pixels[i].min(1.0f) - png.pixels[i]).abs().maxCoeff());
+    CHECK(difference < 0.01);
+    const Imf::InputFile file((folder / "a.exr").c_str());
+    CHECK(number(file.header(), "seconds") > 0);
+    CHECK(number(file.header(), "samples") >= 1);
+  }
+}
+
+TEST_CASE("loberender: --record draws the record that a pixel shows") {
+  const SceneFolder folder(false);
+  const std::string guided = "loberender scene.xml -o a.exr --spp 1 --integrator guided" + kTraining;
+  const ToolRun run = folder.run(guided + " --record 8,11 --record-image floor.png");
+  CAPTURE(run.error);
+  REQUIRE(run.code == 0);
+  CHECK_THAT(run.error, Catch::Contains("floor.png: position ") && Catch::Contains("NEV "));
+  const Image image = readImage(folder / "floor.png");
+  CHECK(image.width > 2 * image.height);
+  // Three panels with something in each.
+  for (const int column : {0, 1, 2}) {
+    std::set<float> greens;
+    for (int y = 0; y < image.height; ++y)
+      for (int x = column * image.width / 3; x < (column + 1) * image.width / 3; ++x) greens.insert(image.at(x, y).y());
+    CHECK(greens.size() > 5);
+  }
+  CHECK(folder.run(guided + " --record 8,11").code == 0);
+  CHECK(folder.has("record.png"));
+}
+
+TEST_CASE("loberender: --record says why there is nothing to draw") {
+  const SceneFolder folder(false);
+  const std::string guided = "loberender scene.xml -o a.exr --spp 1 --integrator guided" + kTraining;
+  CHECK_THAT(fault(folder, guided + " --record 16,0", 1),
+             Catch::Contains("--record 16,0: the picture has 16x12 pixels"));
+  CHECK_THAT(fault(folder, guided + " --record=-1,3", 1), Catch::Contains("--record -1,3: the picture has"));
+  CHECK_THAT(fault(folder, guided + " --record 0,0", 1), Catch::Contains("no surface that scatters light"));
+  CHECK_THAT(fault(folder, guided + " --record 3", 2), Catch::Contains("'3' is not X,Y"));
+  CHECK_THAT(fault(folder, guided + " --record 8,11 --record-image a.exr", 2), Catch::Contains("is written as .png"));
+  CHECK_THAT(fault(folder, guided + " --record-image a.png", 2), Catch::Contains("--record"));
+  CHECK_THAT(fault(folder, "loberender scene.xml -o a.exr --spp 1 --integrator path --record 8,11", 2),
+             Catch::Contains("path learns nothing"));
+  // In the light of nothing no record is made.
+  std::string dark = kScene;
+  const std::string radiance = "radiance\" value=\"";
+  dark[dark.find(radiance) + radiance.size()] = '0';
+  folder.write("scene.xml", dark);
+  const ToolRun run = folder.run(guided + " --record 8,11");
+  CHECK(run.code == 0);  // after hours of work the picture is what counts
+  CHECK_THAT(run.error, Catch::Contains("no record serves the point"));
+  CHECK(folder.has("a.exr"));
+}
