@@ -50,23 +50,29 @@ struct alignas(32) PackedRecord {
     const int number = static_cast<int>(count);
     return {reinterpret_cast<const float*>(this + 1), strideFor(number), number};
   }
-  /// Of the header and the Gaussians.
-  std::size_t bytes() const {
-    return sizeof(PackedRecord) + sizeof(float) * kGaussianFields * static_cast<std::size_t>(gaussians().stride);
+  /// Of the header and the Gaussians of a record.
+  static constexpr std::size_t bytesFor(int count) {
+    return sizeof(float) * (8 + kGaussianFields * static_cast<std::size_t>(strideFor(count)));
   }
 };
 
 /// A copy of a record with its Gaussians, which does not depend on the cache that it came from.
 class RecordCopy {
  public:
-  void assign(const PackedRecord& record) { std::memcpy(memory_.data(), &record, record.bytes()); }
+  void assign(const PackedRecord& record) {
+    // Sizes that are constants, for which no function is called.
+    if (record.count <= kPaddingMultiple)
+      std::memcpy(memory_.data(), &record, PackedRecord::bytesFor(kPaddingMultiple));
+    else
+      std::memcpy(memory_.data(), &record, PackedRecord::bytesFor(kMaxLightComponents));
+  }
   /// After assign.
   const PackedRecord& operator*() const { return *reinterpret_cast<const PackedRecord*>(memory_.data()); }
   const PackedRecord* operator->() const { return &**this; }
 
  private:
-  static constexpr std::size_t kBytes = sizeof(PackedRecord) + sizeof(float) * kGaussianFields * kMaxLightComponents;
-  alignas(PackedRecord) std::array<std::byte, kBytes> memory_;
+  static_assert(sizeof(PackedRecord) == 8 * sizeof(float));
+  alignas(PackedRecord) std::array<std::byte, PackedRecord::bytesFor(kMaxLightComponents)> memory_;
 };
 
 class IlluminationCache {

@@ -51,23 +51,25 @@ bool ImportonWalk::advance() {
   }
   if (!hit->bsdf || !sidesAgree(*hit, hit->woWorld, hit->wo)) return false;
 
-  std::optional<GuidedSampler::Vertex> vertex;
   const float delta = hit->bsdf->deltaProbability(hit->wo, hit->uv);
-  if (delta < 1) {
-    vertex.emplace(sampler_, *hit);
-    if (!vertex->distribution().hasRecord())
-      result_.radiance.requestRecord(asFloats(hit->position), asFloats(normalTowards(*hit)));
-    arrive(*hit);
-    addDirectLight(*hit, *vertex, 1 - delta);
-  }
-  const std::optional<Scattered> scattered = scatter(*hit, vertex, Transport::radiance, rng_);
+  if (delta >= 1) return goOn(*hit, nullptr);
+  const GuidedSampler::Vertex vertex(sampler_, *hit);
+  if (!vertex.distribution().hasRecord())
+    result_.radiance.requestRecord(asFloats(hit->position), asFloats(normalTowards(*hit)));
+  arrive(*hit);
+  addDirectLight(*hit, vertex, 1 - delta);
+  return goOn(*hit, &vertex);
+}
+
+bool ImportonWalk::goOn(const SurfaceHit& hit, const GuidedSampler::Vertex* vertex) {
+  const std::optional<Scattered> scattered = scatter(hit, vertex, Transport::radiance, rng_);
   if (!scattered) return false;
   state_.weight *= scattered->weight;
-  state_.ray = spawnRay(*hit, scattered->direction);
+  state_.ray = spawnRay(hit, scattered->direction);
   pdf_ = scattered->pdf;
-  previous_ = hit->position;
-  if (scattered->pdf > 0) remember(*hit, *vertex, *scattered);
-  return survivesAlbedo(state_.weight, *hit, rng_) && usable(luminance(state_.weight));
+  previous_ = hit.position;
+  if (scattered->pdf > 0) remember(hit, *vertex, *scattered);
+  return survivesAlbedo(state_.weight, hit, rng_) && usable(luminance(state_.weight));
 }
 
 // What comes straight from the camera, or by mirrors only, guides no photon: it would end in the lens.

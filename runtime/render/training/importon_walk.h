@@ -50,6 +50,8 @@ class ImportonWalk {
 
  private:
   bool advance();
+  /// Scatters. vertex: as scatter takes it. False: the path is over.
+  bool goOn(const SurfaceHit& hit, const GuidedSampler::Vertex* vertex);
   void arrive(const SurfaceHit& hit);
   void escape();
   void addDirectLight(const SurfaceHit& hit, const GuidedSampler::Vertex& vertex, float smoothFraction);

@@ -11,7 +11,7 @@ std::optional<Scattered> scatterDelta(const SurfaceHit& hit, float fraction, flo
 
 }  // namespace
 
-std::optional<Scattered> scatter(const SurfaceHit& hit, const std::optional<GuidedSampler::Vertex>& vertex,
+std::optional<Scattered> scatter(const SurfaceHit& hit, const GuidedSampler::Vertex* vertex,
                                  Transport transport, Rng& rng) {
   // Refraction scales radiance, not flux.
   float (*const fluxScale)(float) =

@@ -26,9 +26,9 @@ struct Scattered {
   float pdf;       ///< over solid angle; 0 for the delta part
 };
 
-/// Scatters at hit with the smooth part's direction drawn at vertex, which exists where deltaProbability is under 1.
+/// Scatters at hit with the smooth part's direction drawn at vertex, which is not null where deltaProbability is under 1.
 /// nullopt: the particle is absorbed.
-std::optional<Scattered> scatter(const SurfaceHit& hit, const std::optional<GuidedSampler::Vertex>& vertex,
+std::optional<Scattered> scatter(const SurfaceHit& hit, const GuidedSampler::Vertex* vertex,
                                  Transport transport, Rng& rng);
 
 /// Russian roulette in proportion to what the surface takes on average, whatever direction was drawn: guiding may make

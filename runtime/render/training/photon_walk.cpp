@@ -43,24 +43,26 @@ void PhotonWalk::run(const EmittedPhoton& photon, std::uint64_t index) {
 }
 
 // One segment, what happens at its end, and the branches that leave from there.
-void PhotonWalk::advance(const EmittedPhoton& photon, Branch branch) {
+void PhotonWalk::advance(const EmittedPhoton& photon, const Branch& branch) {
   const std::optional<SurfaceHit> hit = scene_.tracer.trace(branch.state.ray);
   if (!hit || !hit->bsdf || !sidesAgree(*hit, hit->woWorld, hit->wo)) return;
-  std::optional<GuidedSampler::Vertex> vertex;
-  if (hit->bsdf->deltaProbability(hit->wo, hit->uv) < 1) {
-    vertex.emplace(importance_, *hit);
-    if (!vertex->distribution().hasRecord())
-      result_.importance.requestRecord(asFloats(hit->position), asFloats(normalTowards(*hit)));
-    store(photon, branch, *hit);
-  }
+  if (hit->bsdf->deltaProbability(hit->wo, hit->uv) >= 1) return branchOff(branch, *hit, nullptr);
+  const GuidedSampler::Vertex vertex(importance_, *hit);
+  if (!vertex.distribution().hasRecord())
+    result_.importance.requestRecord(asFloats(hit->position), asFloats(normalTowards(*hit)));
+  store(photon, branch, *hit);
+  branchOff(branch, *hit, &vertex);
+}
+
+void PhotonWalk::branchOff(Branch branch, const SurfaceHit& hit, const GuidedSampler::Vertex* vertex) {
   if (branch.depth == kMaxTrainingDepth) return;
   const int branches = applyWeightWindow(branch.state.weight);
   for (int i = 0; i < branches; ++i) {
-    const std::optional<Scattered> scattered = scatter(*hit, vertex, Transport::flux, rng_);
+    const std::optional<Scattered> scattered = scatter(hit, vertex, Transport::flux, rng_);
     if (!scattered) continue;
     Rgb weight = branch.state.weight * scattered->weight;
-    if (survivesAlbedo(weight, *hit, rng_))
-      waiting_.push_back({{spawnRay(*hit, scattered->direction), weight}, branch.depth + 1});
+    if (survivesAlbedo(weight, hit, rng_))
+      waiting_.push_back({{spawnRay(hit, scattered->direction), weight}, branch.depth + 1});
   }
 }
 

@@ -29,7 +29,9 @@ class PhotonWalk {
     ParticleState state;
     int depth;
   };
-  void advance(const EmittedPhoton& photon, Branch branch);
+  void advance(const EmittedPhoton& photon, const Branch& branch);
+  /// Scatters the branches that leave a surface. vertex: as scatter takes it.
+  void branchOff(Branch branch, const SurfaceHit& hit, const GuidedSampler::Vertex* vertex);
   void store(const EmittedPhoton& photon, const Branch& branch, const SurfaceHit& hit);
   int applyWeightWindow(Rgb& weight);
 
