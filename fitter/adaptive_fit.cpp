@@ -16,14 +16,14 @@
 namespace lobe {
 namespace {
 
-// More components have to lower the second moment by this share of the quality asked for, to be worth their time at
+// More components must lower the second moment by this fraction of the requested quality to be worth their cost at
 // every look-up.
 constexpr double kWorthwhile = 0.25;
-// Numbers of components that are tried after one.
+// Numbers of components to try after one.
 constexpr std::array<std::uint32_t, 5> kSizes{2, 3, 4, 6, 8};
-// Decisions need fewer points than the grades that are stored.
+// Decisions need fewer points than the stored grades.
 constexpr std::uint32_t kDecisionFraction = 4;
-// A lobe of this standard deviation on the disc is over ten times narrower than what illumination starts to learn with.
+// This standard deviation on the disc is over ten times smaller than that of the initial incident-radiance mixtures.
 constexpr double kTooNarrow = 0.004;
 constexpr std::uint32_t kTooNarrowRecords = 8;
 
@@ -31,14 +31,14 @@ double secondMoment(const FittedRecord& fitted) {
   return 1.0 + fitted.worse();
 }
 
-/// The standard deviation of the lobe across its narrower axis, for the direction of the normal.
+/// The standard deviation of the lobe along its narrower axis, at normal incidence.
 double widthOf(const Lobe& lobe) {
   constexpr std::uint32_t points = 256;
   const Vec3 wo = Vec3(0.01f, 0.01f, 1).normalized();
   Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
   double weight = 0;
   for (const LobeDraw& d : drawLobe(lobe, wo, 0, points)) {
-    // Tails count little: a narrow peak with long tails is narrow.
+    // Down-weight the tails: a narrow peak with long tails counts as narrow.
     const Eigen::Vector2d y = (toDisc(d.wi) + toDisc(wo)).cast<double>();
     const double w = d.value / d.pdf / (1 + y.squaredNorm() / (kTooNarrow * kTooNarrow));
     squares += w * y * y.transpose();
@@ -54,14 +54,14 @@ bool usesQuarter(const Lobe& lobe, const DirectionGrid& grid) {
   return grid.kind == GridKind::fibonacci && lobe.mirrorSymmetric();
 }
 
-/// The entries to be looked at, from coarse to fine: by the bits of their rank, the lowest first.
+/// The grid entries to visit, from coarse to fine, in bit-reversed order.
 std::vector<int> entriesOf(const Lobe& lobe, const DirectionGrid& grid) {
   std::vector<int> candidates;
   for (int i = 0; i < grid.count; ++i) {
     const Vec3 w = grid.direction(i);
     if (!usesQuarter(lobe, grid) || (w.x() >= 0 && w.y() >= 0)) candidates.push_back(i);
   }
-  // Two directions on both sides of an axis may be the only ones there are.
+  // A very small grid may have no direction in the quadrant.
   if (candidates.empty()) candidates.push_back(0);
   const std::size_t size = std::bit_ceil(candidates.size());
   std::vector<int> ordered;
@@ -74,12 +74,12 @@ std::vector<int> entriesOf(const Lobe& lobe, const DirectionGrid& grid) {
   return ordered;
 }
 
-/// The fits of one direction, and what is good enough there.
+/// Fits mixtures for one direction and knows the quality target there.
 class DirectionFits {
  public:
   DirectionFits(const Lobe& lobe, const Vec3& wo, const FitSettings& settings)
       : fitter_(lobe, wo, settings.samples), settings_(settings) {
-    // The many records of an anisotropic lobe would spend most of their time on this.
+    // For the many records of an anisotropic lobe, this would take most of the fitting time.
     if (lobe.kind() != LobeKind::isotropic) return;
     most_ = byWeightedEm(settings.components);
     const float factor = std::max(1.0f, settings.quality / kDefaultQuality);
@@ -90,11 +90,11 @@ class DirectionFits {
 
   FittedRecord fewest() const { return more(with(1), 2); }
 
-  /// From a neighbour's mixture.
+  /// Starts from the mixture of a neighbouring direction.
   FittedRecord from(std::span<const Gaussian> start) const {
     FittedRecord fitted = refined(start);
     if (goodEnough(fitted)) return less(std::move(fitted));
-    // With as many components again: a start from far away may lead nowhere.
+    // Retry with the same number of components from scratch: the start may have been too far from a good optimum.
     const std::uint32_t first = fitted.record.count;
     return more(std::move(fitted), first);
   }
@@ -115,13 +115,13 @@ class DirectionFits {
     return fitter_.fit(settings, start);
   }
 
-  /// By weighted EM; by least squares from there where that is not good enough.
+  /// Weighted EM, followed by least squares if that is not good enough.
   FittedRecord with(std::uint32_t components) const {
     FittedRecord fitted = most_ && components == settings_.components ? *most_ : byWeightedEm(components);
     return goodEnough(fitted) ? fitted : refined(fitted.mixture);
   }
 
-  /// Tries `first` and more components until they are good enough, and keeps more only if worth it.
+  /// Tries `first` and more components until the fit is good enough; keeps more components only if they are worth it.
   FittedRecord more(FittedRecord best, std::uint32_t first) const {
     for (const std::uint32_t size : kSizes) {
       if (goodEnough(best)) break;
@@ -133,7 +133,7 @@ class DirectionFits {
     return best;
   }
 
-  /// Fewer components, while they are good enough.
+  /// Reduces the number of components while the fit stays good enough.
   FittedRecord less(FittedRecord best) const {
     for (auto size = kSizes.rbegin(); size != kSizes.rend(); ++size) {
       if (*size >= best.record.count) continue;
@@ -146,7 +146,7 @@ class DirectionFits {
 
   DirectionFitter fitter_;
   FitSettings settings_;
-  std::optional<FittedRecord> most_;  // as many components as there may be, by weighted EM
+  std::optional<FittedRecord> most_;  // weighted EM with the largest number of components
 };
 
 class AdaptiveFitter {
@@ -154,7 +154,7 @@ class AdaptiveFitter {
   AdaptiveFitter(const Lobe& lobe, const DirectionGrid& grid, const FitSettings& settings)
       : lobe_(lobe), grid_(grid), settings_(settings) {}
 
-  /// Directions of one level know the records of the levels before, so that their order does not matter.
+  /// Directions of one level use only the records of previous levels, so their order does not affect the result.
   void fit(const std::function<void()>& advance) {
     const std::vector<int> entries = entriesOf(lobe_, grid_);
     for (std::size_t begin = 0; begin < entries.size();) {
@@ -211,11 +211,11 @@ class AdaptiveFitter {
     alignMixture({grid_.kind, references_[found], {}}, neighbour.mixture, wo, aligned);
     const Quality served = gradeMixture(lobe_, wo, aligned, settings_.samples / kDecisionFraction);
     const double moment = 1 + served.worse();
-    // A look-up may be worse than a fit for the direction itself by as much as a fit may be worse than the lobe.
+    // A look-up may be worse than a fit for this direction by the same factor as a fit may be worse than the lobe.
     if (moment <= (1 + targets_[found]) * secondMoment(neighbour)) return std::nullopt;
     const DirectionFits fits(lobe_, wo, settings_);
     FittedRecord fitted = fits.from(aligned);
-    // Where the lobe itself is hard to fit, another record would not help.
+    // Where the lobe is hard to fit, another record would not help.
     if (moment <= (1 + fits.target()) * secondMoment(fitted)) return std::nullopt;
     return Fit{std::move(fitted), fits.target()};
   }
@@ -240,8 +240,8 @@ class AdaptiveFitter {
   const DirectionGrid& grid_;
   const FitSettings& settings_;
   std::vector<FittedRecord> records_;
-  std::vector<Vec2> references_;  // of the records
-  std::vector<double> targets_;   // what was good enough for them
+  std::vector<Vec2> references_;  // on the disc, one per record
+  std::vector<double> targets_;   // quality targets, one per record
 };
 
 }  // namespace

@@ -1,6 +1,6 @@
 #pragma once
-// The fit that chooses for itself: as few records, as few components and as cheap a method as the quality asked for
-// allows.
+// Adaptive fitting of a lobe: the fewest records, the fewest Gaussians per record and the cheapest method that meet a
+// quality target.
 
 #include <functional>
 
@@ -9,27 +9,29 @@
 
 namespace lobe {
 
-/// The quality that charts of quality against time and size recommend.
+/// Default quality target, a relative variance (NEV); chosen from measurements of quality against time and size.
 inline constexpr float kDefaultQuality = 0.03f;
 
-/// Fits the lobe so that every record has an NEV (Quality::worse) of at most a target, where settings.components
-/// Gaussians can do that, and near the best that they can elsewhere. The target is settings.quality or, of an isotropic
-/// lobe and if less, what as many Gaussians have by weighted EM, times quality / kDefaultQuality where more than the
-/// default is allowed: so by default the records of isotropic lobes are as good as weighted EM's.
+/// Fits the lobe so that the relative variance (Quality::worse) of every record is at most a target wherever
+/// settings.components Gaussians can reach it, and close to the best they can reach elsewhere. The target is
+/// settings.quality. For isotropic lobes it is lowered to the relative variance of weighted EM with
+/// settings.components Gaussians, times max(1, quality / kDefaultQuality), if that is less. With the default quality,
+/// the records of isotropic lobes are therefore as good as those of weighted EM.
 ///
-/// Directions are taken from coarse to fine. One that the record nearest to it serves with a second moment at most
-/// 1 + target times the record's own, brought to it by alignMixture, gets none of its own. Of a lobe with
-/// mirrorSymmetric, a quarter of the directions is looked at. A lobe so narrow that no mixture could help gets records
-/// without components. advance is called for every direction looked at, from any thread; the result does not depend on
-/// the number of threads. Throws std::runtime_error as fitLobe.
+/// Directions are visited from coarse to fine. A direction gets no record of its own if the mixture of the nearest
+/// record, aligned with it by alignMixture, has a second moment of at most 1 + target times that of the record. For
+/// lobes with mirrorSymmetric() only one quarter of the directions is visited. A lobe too narrow for mixtures to help
+/// gets records without Gaussians. advance is called once per visited direction, from any thread; the result does not
+/// depend on the number of threads. Throws std::runtime_error like fitLobe.
 FittedGrid fitAdaptively(const Lobe& lobe, const DirectionGrid& grid, const FitSettings& settings,
                          const std::function<void()>& advance = {});
 
-/// One record, by the fewest of at most settings.components Gaussians that meet the target, or by more of them only as
-/// far as they are worth it; by weighted EM where that is enough.
+/// Fits one record with the fewest Gaussians, up to settings.components, that meet the target. Where the target cannot
+/// be met, more Gaussians are used only if they improve the fit enough. Least squares is used only where weighted EM
+/// does not meet the target.
 FittedRecord fitWithFewest(const Lobe& lobe, const Vec3& wo, const FitSettings& settings);
 
-/// How many directions fitAdaptively looks at.
+/// The number of directions that fitAdaptively visits.
 int adaptiveDirections(const Lobe& lobe, const DirectionGrid& grid);
 
 }  // namespace lobe

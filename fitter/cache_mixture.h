@@ -1,5 +1,5 @@
 #pragma once
-// Components as the schema stores them and as the mixture mathematics names them: the same bytes.
+// Conversion between CacheComponent (the file format) and Gaussian (the mixture code), which have the same layout.
 
 #include <cstddef>
 #include <span>

@@ -30,7 +30,7 @@ DirectionGrid gridFor(const Lobe& lobe, const CompileOptions& options) {
   return {GridKind::fibonacci, options.directions.value_or(directions)};
 }
 
-/// Everything the fit depends on, as it is kept in the file.
+/// All settings that the fit depends on, as stored in the file.
 FitSettings settingsFor(const Lobe& lobe, const CompileOptions& options) {
   FitSettings settings = options.settings;
   settings.revision = kFitRevision;
@@ -57,14 +57,14 @@ LobeCacheInfo infoFor(const Lobe& lobe, const DirectionGrid& grid, const FitSett
   return info;
 }
 
-/// Why a cache that says `have` does not serve for `want`; empty when it does. The tool's version does not matter: what
-/// changes a fit raises a revision.
+/// Why a cache with the header `have` cannot be used for `want`; empty if it can. The tool's version does not matter,
+/// since changes that affect a fit increase a revision.
 std::string difference(const LobeCacheInfo& have, const LobeCacheInfo& want) {
-  if (have.key != want.key) return "it is of another lobe";
+  if (have.key != want.key) return "it was fitted for a different lobe";
   if (have.modelRevision != want.modelRevision) return "the model's code has changed";
-  if (have.settings.revision != want.settings.revision) return "the fit's code has changed";
-  if (have.settings != want.settings) return "other fit settings";
-  if (have.gridKind != want.gridKind || have.gridCount != want.gridCount) return "another grid of directions";
+  if (have.settings.revision != want.settings.revision) return "the fitting code has changed";
+  if (have.settings != want.settings) return "different fit settings";
+  if (have.gridKind != want.gridKind || have.gridCount != want.gridCount) return "different grid of directions";
   return {};
 }
 
@@ -81,18 +81,18 @@ void check(CompileJob& job, bool force) {
 void makeFolder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  if (error) throw std::runtime_error(fmt::format("{}: cannot make the folder: {}", folder.string(), error.message()));
+  if (error) throw std::runtime_error(fmt::format("{}: cannot create folder: {}", folder.string(), error.message()));
 }
 
-// ---- Chains: runs of neighbouring directions, each fitted from the one before. They do not depend on the number of
-// threads, so neither do the bytes.
+// ---- Chains: sequences of neighbouring directions, each fitted from the previous one. They do not depend on the
+// number of threads, so the content of the file does not either.
 
 constexpr int kChainLength = 8;
-// A fit from a neighbour that is worse than the neighbour's by more than this is made from scratch as well.
+// A fit that starts from a neighbour and is worse than the neighbour by more than this is also tried from scratch.
 constexpr float kWorseByFactor = 1.5f, kWorseBy = 0.005f;
 
-/// How far apart neighbours are in the grid's order: of Fibonacci points, the largest Fibonacci number up to the root
-/// of their number, which leads to a near neighbour everywhere but at the pole.
+/// Index distance of neighbouring grid entries. For Fibonacci points it is a Fibonacci number near the square root of
+/// their number, which gives a close neighbour everywhere except at the pole.
 int neighbourStride(const DirectionGrid& grid) {
   if (grid.kind == GridKind::elevation) return 1;
   int a = 1, b = 1;
@@ -112,8 +112,8 @@ std::vector<std::vector<int>> chainsOf(const DirectionGrid& grid, const FitSetti
   return chains;
 }
 
-/// Least squares for the product may end in a worse place than weighted EM that has converged; then they start from
-/// there, and are no worse.
+/// Least squares for the product may end in a worse optimum than converged weighted EM. In that case it is restarted
+/// from the result of weighted EM, so the returned fit is never worse than that.
 FittedRecord notAboveWeightedEm(const DirectionFitter& fitter, const FitSettings& settings, FittedRecord found) {
   if (settings.method != FitMethod::ceres) return found;
   FitSettings wem = settings;
@@ -140,7 +140,7 @@ FittedRecord fitFromNeighbour(const DirectionFitter& fitter, const Vec3& wo, Gri
 
 FittedRecord fitOfChain(const Lobe& lobe, const Vec3& wo, GridKind kind, const std::optional<Neighbour>& neighbour,
                         const FitSettings& settings) {
-  // Every record chooses its components for itself.
+  // The number of components is chosen for each record separately.
   if (settings.method == FitMethod::automatic) return fitWithFewest(lobe, wo, settings);
   const DirectionFitter fitter(lobe, wo, settings.samples);
   return notAboveWeightedEm(
@@ -173,7 +173,7 @@ FittedGrid fitEveryEntry(const Lobe& lobe, const DirectionGrid& grid, const FitS
   return result;
 }
 
-/// Of a black lobe: one record without components, which leaves it to the BSDF's own sampling.
+/// The result for a black lobe: one record without components, so the lobe is sampled by the BSDF only.
 FittedGrid withoutFit(const DirectionGrid& grid) {
   FittedGrid result;
   result.append({{}, {}}, 0);
@@ -197,7 +197,7 @@ void CompileOptions::validate() const {
   require(settings.samples >= kMinSamples && settings.samples <= kMaxSamples, "--samples",
           fmt::format("from {} to {}", kMinSamples, kMaxSamples));
   require(settings.reduction >= 0 && std::isfinite(settings.reduction), "--reduction", "0 or more");
-  require(settings.quality > 0 && std::isfinite(settings.quality), "--quality", "over 0");
+  require(settings.quality > 0 && std::isfinite(settings.quality), "--quality", "greater than 0");
   for (const auto& [count, option] : {std::pair{elevations, "--elevations"}, std::pair{directions, "--directions"}})
     require(!count || (*count >= 1 && *count <= kMaxRecords), option, fmt::format("from 1 to {}", kMaxRecords));
 }

@@ -1,5 +1,5 @@
 #pragma once
-// The compile driver: from lobes to cache files that are up to date.
+// Compiles lobes into cache files and finds out which files are already up to date.
 
 #include <filesystem>
 #include <functional>
@@ -14,48 +14,48 @@
 
 namespace lobe {
 
-/// Method auto with the quality that charts of quality against time and size recommend.
+/// FitMethod::automatic with kDefaultQuality.
 FitSettings defaultFitSettings();
 
-/// The grids where no option says otherwise. With method auto few directions need a record of their own, and of
-/// symmetric lobes only a quarter is looked at, so that the grid of anisotropic lobes may be finer.
+/// Default grid sizes. FitMethod::automatic stores records for few of the directions and visits only a quarter of them
+/// for symmetric lobes, so its grid for anisotropic lobes can be finer.
 inline constexpr int kElevations = 64, kDirections = 512, kAutoDirections = 2048;
 
 struct CompileOptions {
   std::filesystem::path directory = "lobes";
   FitSettings settings = defaultFitSettings();
-  std::optional<int> elevations;  ///< records of every isotropic lobe, whether it needs them or not
-  std::optional<int> directions;  ///< the same of anisotropic lobes
-  bool force = false;             ///< fit what is up to date again
+  std::optional<int> elevations;  ///< grid size for isotropic lobes; fits a record for every direction
+  std::optional<int> directions;  ///< the same for anisotropic lobes
+  bool force = false;             ///< also fit lobes whose cache file is up to date
 
-  /// Throws std::runtime_error that names the option.
+  /// Throws a std::runtime_error that names the invalid option.
   void validate() const;
 };
 
-/// One cache file to be had.
+/// One cache file that a scene needs.
 struct CompileJob {
   LobeUse use;
   DirectionGrid grid;
   LobeCacheInfo info;
   std::filesystem::path path;
   bool upToDate = false;
-  std::string stale;  ///< why a file that is there will not do
+  std::string stale;  ///< why an existing file cannot be used; empty otherwise
 };
 
-/// Looks at what is there: a file is up to date when it opens and its key, model revision, settings and grid are those
-/// asked for.
+/// Checks which cache files exist and are up to date: a file is up to date if it can be opened and its key, model
+/// revision, fit settings and grid are the requested ones.
 std::vector<CompileJob> planCompile(const std::vector<LobeUse>& uses, const CompileOptions& options);
 
-/// The number of calls of advance in runCompile.
+/// The number of times that runCompile calls advance.
 int workOf(const CompileJob& job);
 
-/// Fits every record of the job on all cores and writes the file (its folder is made); advance is called for every
-/// direction looked at, from any thread. The file's bytes do not depend on the number of threads. Throws
-/// std::runtime_error.
+/// Fits all records of the job on all cores and writes the file, creating its folder if necessary. advance is called
+/// once per visited direction, from any thread. The content of the file does not depend on the number of threads.
+/// Throws std::runtime_error.
 void runCompile(const CompileJob& job, const std::function<void()>& advance);
 
-/// The fit of a lobe over a grid, as runCompile writes it. Throws std::runtime_error, also when nothing is reflected
-/// from any direction.
+/// Fits a lobe over a grid, as runCompile does. A lobe that reflects nothing from any direction gets one record without
+/// Gaussians. Throws std::runtime_error like fitLobe.
 FittedGrid fitGrid(const Lobe& lobe, const DirectionGrid& grid, const FitSettings& settings,
                    const std::function<void()>& advance = {});
 

@@ -7,12 +7,12 @@
 namespace lobe {
 namespace {
 
-// Along the ray mean + r·v of the azimuth, with v = L (cos φ, sin φ), N dA is exp(−r²/2) r dr dφ / 2π, and the cosine
-// is the parabola a + b r + c r².
+// Along the ray mean + r·v with v = L (cos φ, sin φ), N dA = exp(−r²/2) r dr dφ / 2π, and the cosine is the parabola
+// a + b r + c r².
 struct Parabola {
   double a, b, c;
 
-  /// ∫_0^r exp(−s²/2) s ds and the same times the parabola.
+  /// ∫_0^r exp(−s²/2) s ds, and the same integral with the parabola as a factor.
   DiscMass upTo(double r) const {
     const double tail = std::exp(-0.5 * r * r);
     const double second = std::sqrt(0.5 * std::numbers::pi) * std::erf(r * std::numbers::sqrt2 / 2) - r * tail;
@@ -20,12 +20,12 @@ struct Parabola {
   }
 };
 
-/// The part of one ray that is in the disc, where the parabola is positive.
+/// The integrals over the part of a ray inside the disc, where the parabola is positive.
 DiscMass alongRay(const Parabola& p) {
   const double discriminant = p.b * p.b - 4 * p.a * p.c;
   if (discriminant <= 0) return {0, 0};
   const double root = std::sqrt(discriminant);
-  // c < 0; the form of the far root that does not cancel.
+  // c < 0; this form of the far root avoids cancellation.
   const double far = p.b > 0 ? (p.b + root) / (-2 * p.c) : 2 * p.a / (root - p.b);
   if (far <= 0) return {0, 0};
   DiscMass mass = p.upTo(far);
@@ -38,7 +38,7 @@ DiscMass alongRay(const Parabola& p) {
   return mass;
 }
 
-/// Azimuths needed: in units of the Gaussian the disc's edge is an ellipse as elongated as the Gaussian is.
+/// Number of azimuths: in whitened coordinates the disc is an ellipse that is as elongated as the Gaussian.
 int azimuthCount(const Covariance& v) {
   const double trace = static_cast<double>(v.xx) + v.yy;
   const double elongation =

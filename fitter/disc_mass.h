@@ -1,5 +1,5 @@
 #pragma once
-// How much of a Gaussian of the plane lies on the disc.
+// The mass of a planar Gaussian mixture inside the unit disc.
 
 #include <span>
 
@@ -12,8 +12,9 @@ struct DiscMass {
   double cosine;  ///< ∫ G cosθ dA over the unit disc, cosθ = 1 − |y|²
 };
 
-/// Of Σ weight N. By quadrature in one dimension, the azimuth about each mean; the radius is integrated in closed form.
-/// Absolute error below 1e-5 for means in the disc.
+/// The masses of Σ weight·N, by one-dimensional quadrature over the azimuth about each mean; the radial integral is in
+/// closed form.
+/// The absolute error is below 1e-5 for means inside the disc.
 DiscMass discMass(std::span<const Gaussian> mixture);
 
 }  // namespace lobe

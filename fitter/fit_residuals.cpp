@@ -17,10 +17,10 @@ using Eigen::Index;
 using Eigen::Matrix2d;
 using Eigen::Vector2d;
 
-// Root of the penalty's weight.
+// Square root of the weight of the penalty for mass outside the disc.
 const double kOutsidePenalty = std::sqrt(0.03);
 
-// A component at all points: N, and u = Σ⁻¹(z − mean), of which its derivatives are made.
+// A component at all points: density N, and u = Σ⁻¹(z − mean), which the derivatives need.
 struct ComponentAtPoints {
   Matrix2d inverse;
   ArrayXd u0, u1, density;
@@ -35,7 +35,7 @@ struct ComponentAtPoints {
   }
 };
 
-// By whitened mean and covariance.
+// Derivatives with respect to the whitened mean and covariance.
 MassSlope whitened(const MassSlope& mass, const Whitening& w) {
   return {mass.value, w.factor.transpose() * mass.byMean, w.factor.transpose() * mass.byCov * w.factor};
 }
@@ -73,7 +73,7 @@ using Columns = Eigen::Map<Eigen::MatrixXd>;
 
 void densityDerivatives(const WhitenedComponent& c, const ComponentAtPoints& at, const ArrayXd& mixtureDensity,
                         const ArrayXd& slope, Columns& to) {
-  // By Σ: dN = ½ N tr((u uᵀ − Σ⁻¹) dΣ), so by L: N (u uᵀ − Σ⁻¹) L.
+  // For Σ, dN = ½ N tr((u uᵀ − Σ⁻¹) dΣ), so the derivative with respect to L is N (u uᵀ − Σ⁻¹) L.
   const ArrayXd fraction = c.weight * slope * at.density;
   const Matrix2d sl = at.inverse * c.lower;
   const double l11 = c.lower(0, 0), l21 = c.lower(1, 0), l22 = c.lower(1, 1);
@@ -88,7 +88,7 @@ void densityDerivatives(const WhitenedComponent& c, const ComponentAtPoints& at,
 
 using Slopes = Eigen::Matrix<double, 1, kComponentParameters>;
 
-// How a component's parameters change a mass of the mixture.
+// Derivatives of a mass of the mixture with respect to the parameters of one component.
 Slopes massDerivatives(const WhitenedComponent& c, const MassSlope& mass, double mixtureMass) {
   const Matrix2d byLower = (2 * mass.byCov * c.lower).cwiseProduct(c.lowerSlope);
   const Vector2d byMean = c.meanSlope.transpose() * mass.byMean;
@@ -99,7 +99,7 @@ Slopes massDerivatives(const WhitenedComponent& c, const MassSlope& mass, double
 
 using Residuals = Eigen::Map<ArrayXd>;
 
-// sqrt(w) (f − p)/sqrt(p), whose change by p is −sqrt(w) (f + p)/(2 p^{3/2}); and the penalty.
+// sqrt(w) (f − p)/sqrt(p), with derivative −sqrt(w) (f + p)/(2 p^{3/2}) with respect to p; and the penalty.
 void productResiduals(const State& s, const FitPoints& points, Residuals residuals, double* jacobian) {
   const double guided = (1 - kGradedBsdfFraction) / s.cosine;
   const ArrayXd p = kGradedBsdfFraction * points.ownPdf + guided * points.cosine * s.density;

@@ -1,5 +1,5 @@
 #pragma once
-// The residuals that fits of a lobe by least squares make small, with analytic derivatives.
+// Residuals of the least-squares fit of a lobe, with analytic derivatives.
 
 #include <vector>
 
@@ -9,28 +9,28 @@
 
 namespace lobe {
 
-/// What a mixture is fitted for.
+/// The objective that a fit minimises.
 enum class FitObjective {
-  /// The use in a product: χ² = ∫ (f − p)²/p dA over the disc with f = ρ cosθ / ∫ρ cosθ dA and
-  /// p = 0.1 q + 0.9 G cosθ / ∫G cosθ dA, q the density of the lobe's sampler. Its value is the NEV of p, to which a
-  /// small penalty is added for the square of G's share outside the disc, which costs nothing else here.
+  /// Variance when sampling the product: χ² = ∫ (f − p)²/p dA over the disc with f = ρ cosθ / ∫ρ cosθ dA and
+  /// p = 0.1 q + 0.9 G cosθ / ∫G cosθ dA, q the density of the lobe's sampler. This is the relative variance (NEV) of
+  /// sampling f with p. A small penalty is added for the square of G's mass outside the disc, which does not affect p.
   product,
-  /// ∫ (1 − ρ̂/G)² q dA with ρ̂ = ρ/∫ρ dA: Herholz et al. 2016, Eq. 8, in one measure.
+  /// ∫ (1 − ρ̂/G)² q dA with ρ̂ = ρ/∫ρ dA: Herholz et al. 2016, Eq. 8, with both densities in the measure of the disc.
   reflectance,
 };
 
-/// The points of a fit, all densities over the disc's area.
+/// Sample points of a fit; all densities are with respect to area on the disc.
 struct FitPoints {
   Whitening whitening;
   Eigen::ArrayXd x, y;    ///< whitened
   Eigen::ArrayXd target;  ///< f or ρ̂
   Eigen::ArrayXd ownPdf;  ///< q
   Eigen::ArrayXd cosine;
-  Eigen::ArrayXd weight;  ///< of the quadrature: Σ weight·h is ∫ h dA (product) or ∫ h q dA (reflectance)
+  Eigen::ArrayXd weight;  ///< quadrature weight: Σ weight·h ≈ ∫ h dA (product) or ∫ h q dA (reflectance)
   Eigen::Index size() const { return x.size(); }
 };
 
-/// In the form that Ceres' TinySolver takes. Keeps a reference to the points.
+/// Residual functor for Ceres' TinySolver. Keeps a reference to the points.
 class FitResiduals {
  public:
   using Scalar = double;
@@ -42,7 +42,7 @@ class FitResiduals {
   int NumResiduals() const { return static_cast<int>(points_.size()) + (objective_ == FitObjective::product ? 1 : 0); }
   int NumParameters() const { return kComponentParameters * components_; }
 
-  /// jacobian: column-major, a row a residual; may be null. Always true.
+  /// jacobian is column-major with one row per residual, and may be null. Always returns true.
   bool operator()(const double* parameters, double* residuals, double* jacobian) const;
 
  private:

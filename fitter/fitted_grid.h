@@ -1,5 +1,5 @@
 #pragma once
-// The fit of a lobe over a grid of directions, in the form of a cache.
+// A lobe fitted over a grid of directions, laid out as in a cache file.
 
 #include <span>
 #include <vector>
@@ -13,10 +13,11 @@ namespace lobe {
 struct FittedGrid {
   std::vector<CacheRecord> records;
   std::vector<CacheComponent> components;
-  std::vector<std::uint32_t> lookup;  ///< of every entry of the grid, the record
+  std::vector<std::uint32_t> lookup;  ///< the record of every grid entry
   bool quarter = false;               ///< see LobeCacheInfo
 
-  /// What a look-up for wo finds: writes to the front of room, which holds kMaxCacheComponents, and returns that.
+  /// The mixture that a cache look-up returns for wo. It is written to the front of room, which must hold
+  /// kMaxCacheComponents Gaussians; returns the part that was written.
   std::span<Gaussian> mixtureFor(const DirectionGrid& grid, const Vec3& wo, std::span<Gaussian> room) const;
 
   void append(const FittedRecord& fitted, std::uint32_t entry);

@@ -15,7 +15,7 @@ Float3 floats(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
 }
 
-/// A host's functions behind the interface that the fit knows.
+/// Adapts the functions of a host renderer to the Lobe interface.
 class HostLobe : public Lobe {
  public:
   explicit HostLobe(const LobeFunctions& functions) : functions_(functions) {}
@@ -50,7 +50,7 @@ void validate(const LobeFunctions& lobe) {
         fmt::format("LobeFunctions::model '{}' must be a name of letters, digits, '-' and '_'", lobe.model));
   if (lobe.key.empty()) throw std::runtime_error("LobeFunctions::key must not be empty");
   if (!lobe.evaluate || !lobe.sample || !lobe.pdf)
-    throw std::runtime_error("LobeFunctions: evaluate, sample and pdf must all be given");
+    throw std::runtime_error("LobeFunctions: evaluate, sample and pdf must all be set");
 }
 
 }  // namespace

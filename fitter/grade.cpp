@@ -8,7 +8,7 @@
 namespace lobe {
 namespace {
 
-/// p of Quality over solid angle, with dω = 2 dA.
+/// The density p of Quality over solid angle, with dω = 2 dA.
 class GradedDensity {
  public:
   GradedDensity(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> mixture)
@@ -32,7 +32,7 @@ struct Moments {
   double relativeVariance() const { return first > 0 ? std::max(0.0, second / (first * first) - 1) : 0; }
 };
 
-/// The largest of the ratios it is shown.
+/// The largest ratio and its direction.
 struct Worst {
   double ratio = 0;
   Vec3 wi = Vec3::UnitZ();
@@ -41,7 +41,7 @@ struct Worst {
   }
 };
 
-/// ∫ f and ∫ f²/p from points of G, times `share`. G is drawn in place of G cosθ/A and weighted by cosθ/A.
+/// Estimates of ∫ f and ∫ f²/p with points from G, weighted by cosθ/A in place of points from G cosθ/A.
 Moments fromMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> mixture, const GradedDensity& p,
                     std::uint32_t samples, Worst& worst) {
   Moments sum;
@@ -60,9 +60,9 @@ Moments fromMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> 
   return sum;
 }
 
-/// What points of q say of a mixture.
+/// Estimates with points from q.
 struct FromOwn {
-  Moments drawn, coverage;  // ∫ f and ∫ f²/p: drawn from q as a part of p; by importance sampling from q
+  Moments drawn, coverage;  // ∫ f and ∫ f²/p: with q as one component of p; by importance sampling with q
   Worst worst;
 };
 

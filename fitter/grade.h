@@ -1,5 +1,5 @@
 #pragma once
-// How good a mixture is for a lobe's use in a product.
+// Measures how well a mixture fits a lobe, by the variance of sampling with it.
 
 #include <algorithm>
 #include <span>
@@ -10,35 +10,36 @@
 
 namespace lobe {
 
-/// The share of BSDF sampling in the density that a fit is graded with.
+/// The BSDF sampling fraction of the density that a fit is graded with.
 inline constexpr double kGradedBsdfFraction = 0.1;
 
-/// NEV of one sample for f = ρ cosθ against p = 0.1 q + 0.9 G cosθ / ∫ G cosθ dA, q the lobe's own density: the
-/// relative variance of f/p. Samples that the sampler rejects count, with f = 0. 0 where nothing is reflected.
+/// The relative variance (NEV) of the one-sample estimator f/p for f = ρ cosθ and p = 0.1 q + 0.9 G cosθ / ∫ G cosθ dA,
+/// where q is the density of the lobe's own sampler. Samples that the sampler rejects count as f = 0. All values are 0
+/// where nothing is reflected.
 struct Quality {
-  /// What the use of a fit is judged by. Each estimate alone may miss what its points miss.
+  /// The value that fits are compared by. Each of the two estimates may miss regions that its points do not sample.
   double worse() const { return std::max(nev, coverage); }
 
-  double nev;       ///< drawn from p
-  double coverage;  ///< the same quantity drawn from q, which also sees what the mixture misses
-  double worst;     ///< largest f/p of all points visited, in units of ∫ f dω; 0 where nothing is reflected
+  double nev;       ///< estimated with points drawn from p
+  double coverage;  ///< the same quantity estimated with points from q, which also sample what the mixture misses
+  double worst;     ///< largest f/p of all points, in units of ∫ f dω; 0 where nothing is reflected
   Vec3 worstAt;     ///< wi of that point; the normal where nothing is reflected
 };
 
-/// Grades any mixture over the disc (weights sum to one) with `samples` points of each density. The points are none of
-/// those that fitLobe draws with as many samples.
+/// Grades a mixture over the disc (weights sum to one) with `samples` points of each density. The points differ from
+/// those that fitLobe uses with the same number of samples.
 Quality gradeMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> mixture, std::uint32_t samples);
 
-/// Grades mixtures for one direction, which share the points of q. Keeps a reference to the lobe.
+/// Grades several mixtures for one direction, reusing the points of q. Keeps a reference to the lobe.
 class Grader {
  public:
-  /// Throws std::runtime_error as drawLobe.
+  /// Throws std::runtime_error like drawLobe.
   Grader(const Lobe& lobe, const Vec3& wo, std::uint32_t samples);
 
-  /// As gradeMixture.
+  /// The same as gradeMixture.
   Quality grade(std::span<const Gaussian> mixture) const;
 
-  /// Quality::coverage alone, for less than half the time.
+  /// Computes only Quality::coverage, in less than half the time.
   double coverage(std::span<const Gaussian> mixture) const;
 
  private:

@@ -16,14 +16,14 @@
 namespace lobe {
 namespace {
 
-// The start covariance of every component, in units of the lobe's own.
+// Initial covariance of every component, relative to the covariance of the lobe.
 constexpr float kStartScale = 0.5f;
-// Floor of the components' variance, in units of the smaller variance of the lobe: no spikes on single points. The long
-// tails of GGX make that variance a thousand times the peak's at grazing angles.
+// Lower bound of the components' variance, relative to the smaller variance of the lobe, to prevent spikes on single
+// points. At grazing angles the long tails of GGX make the variance of the lobe a thousand times that of its peak.
 constexpr double kVarianceFloor = 1e-4;
-// Single precision resolves the disc to about 1e-7.
+// Smallest standard deviation; single precision resolves about 1e-7 on the disc.
 constexpr double kSharpest = 1e-5;
-// Weighted EM that only starts least squares need not converge, nor see all points.
+// When weighted EM only provides the start of least squares, it need not converge or use all points.
 constexpr int kStartSweeps = 15;
 constexpr std::size_t kStartFraction = 4;
 constexpr float kBroadVariance = 0.25f;
@@ -53,7 +53,7 @@ Spread spreadOf(const std::vector<WeightedPoint>& points) {
   return spread;
 }
 
-/// The first points as means; the sequence is even, so they cover the lobe.
+/// Uses the first points as means; the sequence is low-discrepancy, so they cover the lobe.
 Mixture startMixture(const std::vector<WeightedPoint>& points, const Spread& spread, std::size_t components) {
   const std::size_t count = std::min(components, points.size());
   Covariance cov{kStartScale * static_cast<float>(spread.xx), kStartScale * static_cast<float>(spread.xy),
@@ -64,7 +64,7 @@ Mixture startMixture(const std::vector<WeightedPoint>& points, const Spread& spr
   return mixture;
 }
 
-/// Weights that sum to one in single precision.
+/// Makes the weights sum to one in single precision.
 void normalise(Mixture& mixture) {
   double sum = 0;
   for (const Gaussian& g : mixture) sum += g.weight;
@@ -87,7 +87,7 @@ Mixture DirectionFitter::expectationMaximised(const FitSettings& settings) const
   std::vector<WeightedPoint> points = weightedPoints(draws_);
   Spread spread = spreadOf(points);
   if (points.size() < 3) spread = {kBroadVariance, 0, kBroadVariance};
-  if (!(spread.smallerVariance() > kSharpest * kSharpest)) refuseLobe(lobe_, wo_, "it is too sharp, a mirror would do");
+  if (!(spread.smallerVariance() > kSharpest * kSharpest)) refuseLobe(lobe_, wo_, "it is too sharp, use a mirror");
   Mixture mixture = startMixture(points, spread, settings.components);
   WeightedEmOptions options;
   options.minVariance = kVarianceFloor * spread.smallerVariance();
@@ -106,7 +106,7 @@ DirectionFitter::Graded DirectionFitter::graded(Mixture mixture) const {
   return {std::move(mixture), quality};
 }
 
-/// The start, refined when that makes it better.
+/// Refines the start by least squares; returns the better of the two.
 DirectionFitter::Graded DirectionFitter::refined(const Mixture& start, const FitSettings& settings) const {
   NonlinearFitOptions options;
   if (settings.method == FitMethod::eq8) options.objective = FitObjective::reflectance;
@@ -114,7 +114,7 @@ DirectionFitter::Graded DirectionFitter::refined(const Mixture& start, const Fit
   Mixture mixture = refineMixture(lobe_, wo_, start, options).mixture;
   normalise(mixture);
   Graded after = graded(std::move(mixture));
-  // The start is no better than half of its grade, which costs little.
+  // The coverage is a lower bound of the start's grade and is cheap to compute.
   if (after.quality.worse() < grader_.coverage(start)) return after;
   Graded before = graded(start);
   return after.quality.worse() < before.quality.worse() ? after : before;

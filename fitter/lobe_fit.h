@@ -1,6 +1,6 @@
 #pragma once
-// One record: the mixture of a lobe for one direction wo, by weighted EM or by least squares from there, and how good
-// it is.
+// Fits one record: the mixture of a lobe for one direction wo, by weighted EM and optionally least squares, and its
+// quality.
 //
 // The mixture is fitted to ρ without the cosine (the cosine belongs to the illumination), over the disc of wi.
 
@@ -13,25 +13,25 @@
 
 namespace lobe {
 
-/// Raised when the code of the fit changes what it returns; caches of another revision are stale.
+/// Increased whenever a code change alters the results of a fit; caches of another revision are stale.
 inline constexpr std::uint32_t kFitRevision = 3;
 
-// FitMethod::automatic: as ceres, with as little as is good enough (adaptive_fit.h); wem: weighted EM; ceres: least
-// squares for the use in a product; eq8: least squares by the objective of Herholz et al. 2016, Eq. 8.
+// FitMethod::wem: weighted EM; ceres: least squares, FitObjective::product; eq8: least squares by the objective of
+// Herholz et al. 2016, Eq. 8; automatic: the cheapest of wem and ceres that meets the quality target (adaptive_fit.h).
 
 struct FittedRecord {
   Mixture mixture;                                                          ///< weights sum to one
   CacheRecord record;                                                       ///< first is 0, count is mixture.size()
-  float worse() const { return std::max(record.nev, record.nevCoverage); }  ///< as Quality::worse
+  float worse() const { return std::max(record.nev, record.nevCoverage); }  ///< see Quality::worse
 };
 
-/// The fits of one direction, which share what is drawn of the lobe. Keeps a reference to the lobe.
+/// Fits mixtures for one direction, reusing the samples of the lobe. Keeps a reference to the lobe.
 class DirectionFitter {
  public:
-  /// Throws std::runtime_error when the lobe returns numbers that are not finite.
+  /// Throws std::runtime_error if the lobe returns numbers that are not finite.
   DirectionFitter(const Lobe& lobe, const Vec3& wo, std::uint32_t samples);
 
-  /// As fitLobe, with the samples of the constructor.
+  /// The same as fitLobe, with the number of samples given to the constructor.
   FittedRecord fit(const FitSettings& settings, std::span<const Gaussian> start = {}) const;
 
  private:
@@ -47,11 +47,11 @@ class DirectionFitter {
   Grader grader_;
 };
 
-/// Fits the lobe for wo (unit, z > 0). Deterministic. Where nothing is reflected the record has integral and albedo 0
-/// and a broad component. Least squares start from weighted EM, or from `start` where one is given (the mixture of a
-/// neighbouring direction, brought to wo), whose components then keep their order and number; what they find is kept
-/// only when it grades better than the start (by Quality::worse). Throws std::runtime_error when the lobe returns
-/// numbers that are not finite, or is too sharp, or when there is no such method.
+/// Fits the lobe for wo (unit, z > 0). Deterministic. Where nothing is reflected, the record has integral and albedo 0
+/// and one broad component. Least squares starts from weighted EM, or from `start` if it is not empty (the mixture of a
+/// neighbouring direction, aligned with wo), whose components keep their order and number. The result of least squares
+/// is kept only if its grade (Quality::worse) is better than that of the start. Throws std::runtime_error if the lobe
+/// returns numbers that are not finite or is too sharp.
 FittedRecord fitLobe(const Lobe& lobe, const Vec3& wo, const FitSettings& settings,
                      std::span<const Gaussian> start = {});
 

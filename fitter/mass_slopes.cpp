@@ -13,12 +13,12 @@ namespace {
 using Eigen::Matrix2d;
 using Eigen::Vector2d;
 
-// A Gaussian reaches this many standard deviations, for the purposes of a fit.
+// The mass of a Gaussian beyond this many standard deviations is neglected.
 constexpr double kReach = 5;
 constexpr int kLeastAzimuths = 128, kMostAzimuths = 1024;
 constexpr double kAzimuthsPerElongation = 64;
 
-// ∫ exp(−r²/2) rⁿ dr between the ray's ends for n = 1, 2, 3.
+// ∫ exp(−r²/2) rⁿ dr along a segment of a ray, for n = 1, 2, 3.
 struct RadialMoments {
   double first = 0, second = 0, third = 0;
 
@@ -33,13 +33,13 @@ struct RadialMoments {
   }
 };
 
-// Where mean + r·v is in the disc, r > 0.
+// Moments over the part of the ray mean + r·v, r > 0, inside the disc.
 RadialMoments insideDisc(const Vector2d& mean, const Vector2d& v) {
   const double a = 1 - mean.squaredNorm(), b = -2 * mean.dot(v), c = -v.squaredNorm();
   const double discriminant = b * b - 4 * a * c;
   if (discriminant <= 0) return {};
   const double root = std::sqrt(discriminant);
-  const double far = b > 0 ? (b + root) / (-2 * c) : 2 * a / (root - b);  // the form that does not cancel
+  const double far = b > 0 ? (b + root) / (-2 * c) : 2 * a / (root - b);  // avoids cancellation
   if (far <= 0) return {};
   const double near = (b - root) / (-2 * c);
   if (a >= 0 || near <= 0) return RadialMoments::upTo(far);
@@ -89,9 +89,10 @@ MassSlopes massSlopes(const Vector2d& mean, const Matrix2d& factor) {
             {1 - mean.squaredNorm() - factor.squaredNorm(), -2 * mean, -Matrix2d::Identity()}};
   const Expectations e = byQuadrature(mean, factor);
   const Matrix2d inverse = factor.inverse();
-  // The edge itself moves no cosine, which is 0 there: the slopes are −2 E[y] and, by the factor, −2 E[y ζᵀ].
+  // The cosine is 0 at the edge, so there is no boundary term: the derivatives are −2 E[y] with respect to the mean and
+  // −2 E[y ζᵀ] with respect to the factor.
   const MassSlope cosine{e.cosine, -2 * e.y, symmetric(-e.yZeta * inverse)};
-  // Of the mass alone they are the normal density's own.
+  // For the mass without the cosine, integrate the derivatives of the normal density.
   const Matrix2d byCov = 0.5 * inverse.transpose() * (e.zetaZeta - e.one * Matrix2d::Identity()) * inverse;
   return {{e.one, inverse.transpose() * e.zeta, symmetric(byCov)}, cosine};
 }

@@ -1,5 +1,5 @@
 #pragma once
-// A Gaussian's mass on the disc, with and without the cosine, and how it changes with mean and covariance: for fits.
+// The mass of a Gaussian inside the unit disc, with and without the cosine, and its derivatives, for fits.
 
 #include <Eigen/Core>
 
@@ -7,8 +7,8 @@ namespace lobe {
 
 struct MassSlope {
   double value;
-  Eigen::Vector2d byMean;  ///< the gradient
-  Eigen::Matrix2d byCov;   ///< symmetric Γ: the change is tr(Γ dΣ)
+  Eigen::Vector2d byMean;  ///< gradient with respect to the mean
+  Eigen::Matrix2d byCov;   ///< symmetric Γ such that d value = tr(Γ dΣ)
 };
 
 struct MassSlopes {
@@ -16,10 +16,10 @@ struct MassSlopes {
   MassSlope cosine;  ///< ∫ N cosθ dA, cosθ = 1 − |y|²
 };
 
-/// Of N(mean, factor·factorᵀ), mean in the disc, factor invertible. In closed form where the Gaussian keeps clear of
-/// the edge; else by quadrature over the azimuth about the mean with the radius in closed form, as discMass but
-/// coarser: to about 1e-4, the slopes of long thin Gaussians at the very edge to some percent. Enough for the steps of
-/// a fit.
+/// The masses of N(mean, factor·factorᵀ); the mean must be inside the disc and factor invertible. Closed form if the
+/// Gaussian is far from the edge; otherwise quadrature over the azimuth about the mean, as in discMass but coarser. The
+/// error is about 1e-4, and a few percent for the derivatives of elongated Gaussians at the edge, which is accurate
+/// enough for the steps of a fit.
 MassSlopes massSlopes(const Eigen::Vector2d& mean, const Eigen::Matrix2d& factor);
 
 }  // namespace lobe

@@ -10,7 +10,7 @@
 namespace lobe {
 namespace {
 
-// Points of a fit, before they are put into arrays.
+// A point of a fit, before conversion to arrays.
 struct Point {
   Vec2 y;
   double value;  // ρ
@@ -42,7 +42,7 @@ void addStartPoints(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> 
   }
 }
 
-/// The balance heuristic: one over the density of all points.
+/// Balance heuristic: the weight is the reciprocal of the summed density of all points.
 void balance(std::span<const Gaussian> start, double own, double guided, std::vector<Point>& points) {
   for (Point& p : points) p.weight = 1 / (own * p.pdf + guided * mixturePdf(start, p.y));
 }
@@ -83,7 +83,7 @@ FitPoints asArrays(const std::vector<Point>& points, bool product) {
   return a;
 }
 
-/// Whether the points span an area.
+/// Whether the points span a two-dimensional area.
 bool wide(const Whitening& w) {
   constexpr double kNarrowest = 1e-6;
   return w.factor.diagonal().minCoeff() > kNarrowest;
@@ -107,7 +107,7 @@ FitPoints fitPoints(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> 
 
 namespace {
 
-/// Levenberg–Marquardt on points drawn for this start.
+/// Runs Levenberg–Marquardt on points drawn for this start.
 NonlinearFit solved(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> start,
                     const NonlinearFitOptions& options) {
   NonlinearFit fit{{start.begin(), start.end()}};
@@ -133,7 +133,7 @@ NonlinearFit solved(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> 
 
 NonlinearFit refineMixture(const Lobe& lobe, const Vec3& wo, std::span<const Gaussian> start,
                            const NonlinearFitOptions& options) {
-  // Most of the way is as well gone on few points.
+  // A first solve on few points does most of the work at a fraction of the cost.
   NonlinearFitOptions coarse = options;
   coarse.points /= kCoarseFraction;
   coarse.tolerance *= kCoarseTolerance;

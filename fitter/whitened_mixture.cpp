@@ -16,7 +16,7 @@ using Eigen::Vector2d;
 
 constexpr double kLeastWeight = 1e-6;
 
-/// L with L Lᵀ nearest to covariance − kLeastVariance·I that is positive definite.
+/// L such that L Lᵀ is the positive definite matrix closest to covariance − kLeastVariance·I.
 Matrix2d lowerFactor(const Matrix2d& covariance) {
   const Eigen::SelfAdjointEigenSolver<Matrix2d> axes(covariance);
   const Vector2d variances = (axes.eigenvalues().array() - kLeastVariance).max(0.1 * kLeastVariance);
@@ -28,11 +28,11 @@ Matrix2d lowerFactor(const Matrix2d& covariance) {
   return lower;
 }
 
-// Means stay in the disc: from this radius on, the parameters' distance r from the centre is bent to
-// kBend + kRoom t/(1 + t), t = (r − kBend)/kRoom, which stays below 1 in single precision too.
+// Means must stay in the disc: beyond the radius kBend, the distance r of the parameters from the centre is mapped to
+// kBend + kRoom t/(1 + t) with t = (r − kBend)/kRoom, which stays below 1 in single precision.
 constexpr double kBend = 0.9, kRoom = 0.09999, kLargestRadius = 0.999;
 
-/// The mean over the disc for parameters that stand for the point y, and its slope.
+/// Maps the unconstrained mean y into the disc; slope is the derivative.
 Vector2d bent(const Vector2d& y, Matrix2d& slope) {
   const double r = y.norm();
   slope.setIdentity();

@@ -1,6 +1,6 @@
 #pragma once
-// A mixture as the free parameters of a fit: in coordinates in which the lobe has mean 0 and covariance I, with
-// positive definite covariances and weights that sum to one by construction.
+// Unconstrained parameters of a mixture for a fit, in whitened coordinates where the lobe has mean 0 and covariance I.
+// Covariances are positive definite and weights sum to one by construction.
 
 #include <span>
 #include <vector>
@@ -19,32 +19,32 @@ struct Whitening {
   Eigen::Vector2d inverse(const Eigen::Vector2d& y) const;
 };
 
-/// Of a component: logarithm of its weight before normalisation, mean (2), log l11, l21, log l22, with
-/// Σ = L Lᵀ + kLeastVariance·I in whitened coordinates. Beyond kLargestDeviation the entries of L no longer follow.
+/// Parameters per component: logarithm of the weight before normalisation, mean (2), log l11, l21, log l22, with
+/// Σ = L Lᵀ + kLeastVariance·I in whitened coordinates. The entries of L are clamped to kLargestDeviation.
 inline constexpr int kComponentParameters = 6;
 
-/// Of the lobe's own variance: no component is a spike that hides between the points of a fit.
+/// Lower bound of a variance, relative to the lobe's: prevents spikes between the points of a fit.
 inline constexpr double kLeastVariance = 1e-5;
 
-/// Of the lobe's own deviation: a component that has lost its weight does not grow without end.
+/// Upper bound relative to the lobe's standard deviation: prevents components of vanishing weight from growing.
 inline constexpr double kLargestDeviation = 5;
 
 struct WhitenedComponent {
   double weight;
   Eigen::Vector2d mean;
-  Eigen::Matrix2d meanSlope;   ///< of the mean by its parameters
+  Eigen::Matrix2d meanSlope;   ///< derivative of the mean with respect to its parameters
   Eigen::Matrix2d lower;       ///< L
-  Eigen::Matrix2d lowerSlope;  ///< of each entry of L by its parameter
+  Eigen::Matrix2d lowerSlope;  ///< derivative of each entry of L with respect to its parameter
   Eigen::Matrix2d covariance;  ///< Σ
 };
 
-/// Softmax and the rest; parameters has a multiple of kComponentParameters entries.
+/// Decodes the parameters (softmax for the weights); their number must be a multiple of kComponentParameters.
 std::vector<WhitenedComponent> fromParameters(std::span<const double> parameters, const Whitening& whitening);
 
-/// The nearest parameters of a mixture over the disc; components of weight 0 get a very small one.
+/// The parameters closest to a mixture over the disc; components of weight 0 get a very small weight.
 Eigen::VectorXd toParameters(std::span<const Gaussian> mixture, const Whitening& whitening);
 
-/// Back to the disc, in single precision, positive definite.
+/// The mixture over the disc in single precision, with positive definite covariances.
 Mixture toMixture(const std::vector<WhitenedComponent>& components, const Whitening& whitening);
 
 }  // namespace lobe

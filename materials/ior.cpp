@@ -14,7 +14,7 @@ struct NamedIor {
   double value;
 };
 
-// At 589 nm and room temperature (Hecht, Optics), by the names of Mitsuba.
+// Indices at 589 nm and room temperature (Hecht, Optics), under Mitsuba's names.
 constexpr NamedIor kDielectrics[] = {
     {"acetone", 1.36},
     {"acrylic glass", 1.49},
@@ -47,7 +47,7 @@ struct NamedConductor {
   float k[3];
 };
 
-// Measured spectra integrated against the colour matching functions, Rec. 709 primaries, as renderers use them.
+// Measured spectra integrated against the colour matching functions, for Rec. 709 primaries.
 constexpr NamedConductor kConductors[] = {
     {"none", {0.0f, 0.0f, 0.0f}, {1.0f, 1.0f, 1.0f}},
     {"a-C", {2.94410f, 2.22715f, 1.96817f}, {0.887433f, 0.799322f, 0.815286f}},
@@ -98,7 +98,7 @@ std::string lower(std::string_view text) {
   return result;
 }
 
-/// The entry of a table by name in any case; ParameterError lists the table.
+/// Finds an entry by its name, in any case. Throws ParameterError with the list of known names.
 template <typename Table>
 const auto& lookUp(const Table& table, std::string_view parameter, const std::string& wanted) {
   std::string known;
@@ -107,16 +107,17 @@ const auto& lookUp(const Table& table, std::string_view parameter, const std::st
     known += fmt::format("{}{}", known.empty() ? "" : ", ", entry.name);
   }
   throw ParameterError(std::string(parameter),
-                       fmt::format("unknown {} \"{}\"; known are a number, or {}", parameter, wanted, known));
+                       fmt::format("unknown {} \"{}\"; known names are {}", parameter, wanted, known));
 }
 
-/// A spectrum fitted by three numbers may have overshot. Fresnel's formulas hold squares of both only, so that other
-/// renderers take such numbers without their sign; the picture is to be theirs.
+/// RGB values fitted to a spectrum may be negative. The Fresnel equations contain only the squares of eta and k, so
+/// other renderers implicitly use absolute values; this matches their images.
 Rgb readUnsigned(const Parameters& parameters, std::string_view name, const float (&preset)[3]) {
   const Rgb colour = parameters.colour(name, Rgb(preset[0], preset[1], preset[2]));
   if (!colour.allFinite()) throw ParameterError(std::string(name), fmt::format("{} must be finite", name));
   if ((colour < 0.0f).any())
-    parameters.note(fmt::format("{} {}, {}, {} is taken without its signs", name, colour.x(), colour.y(), colour.z()));
+    parameters.note(fmt::format("{} {}, {}, {} has negative components; their absolute values are used", name,
+                                colour.x(), colour.y(), colour.z()));
   return colour.abs();
 }
 
@@ -136,7 +137,7 @@ double readRelativeIor(const Parameters& parameters, std::string_view interiorFa
 
 ComplexIor readConductor(const Parameters& parameters) {
   std::string name = parameters.text("material", "Cu");
-  // Of the same measurements under two names.
+  // Some scene files append the source of the measurement to the name; the values are the same.
   if (constexpr std::string_view kSource = "_palik"; name.ends_with(kSource)) name.resize(name.size() - kSource.size());
   const NamedConductor& preset = lookUp(kConductors, "material", name);
   const float outside = static_cast<float>(readIor(parameters, "ext_eta", "air"));

@@ -1,5 +1,5 @@
 #pragma once
-// Indices of refraction: by number or by the names scene files use.
+// Indices of refraction, given as numbers or by the names used in scene files.
 
 #include <string_view>
 
@@ -7,11 +7,11 @@
 
 namespace lobe {
 
-/// The parameter as a number or as a name ("bk7", any case); the fallback is a name. ParameterError: an unknown name or
-/// an index that is not positive.
+/// Reads an index given as a number or as a name such as "bk7", in any case; the fallback is a name. Throws
+/// ParameterError for an unknown name or an index that is not positive.
 double readIor(const Parameters& parameters, std::string_view name, std::string_view fallback);
 
-/// int_ior over ext_ior (default air). ParameterError as above.
+/// int_ior divided by ext_ior (default air). Throws ParameterError as readIor.
 double readRelativeIor(const Parameters& parameters, std::string_view interiorFallback);
 
 struct ComplexIor {
@@ -19,9 +19,10 @@ struct ComplexIor {
   Rgb k;
 };
 
-/// material (default Cu, as in Mitsuba 0.6; "none" is a perfect mirror; "_palik" after a name is passed over), eta, k
-/// and ext_eta (default air), which both are divided by. Negative components of eta and k become zero, with a note.
-/// ParameterError: an unknown name, a number that is not finite, or an ext_eta that is not positive.
+/// Reads material (default Cu, as in Mitsuba 0.6; "none" is a perfect mirror; a suffix "_palik" is ignored), eta, k and
+/// ext_eta (default air), by which eta and k are divided. Negative components of eta and k are replaced by their
+/// absolute values, with a note. Throws ParameterError for an unknown name, a number that is not finite, or an ext_eta
+/// that is not positive.
 ComplexIor readConductor(const Parameters& parameters);
 
 }  // namespace lobe

@@ -1,8 +1,9 @@
 #pragma once
-// A lobe: the colourless part of a material that is fitted alone. Materials are sums of lobes with colours.
+// A lobe: a colourless part of a material for which a cache is fitted. Materials are sums of lobes with colours.
 //
-// Conventions of all of materials/: local frame, z is the normal; wo is the given direction (towards where the path
-// came from), wi the sampled one; both point away from the surface. Densities are over solid angle.
+// Conventions in materials/: directions are in the local frame, in which z is the normal. wo is the given direction
+// (towards the previous path vertex) and wi the sampled one; both point away from the surface. Densities are over solid
+// angle.
 
 #include <memory>
 #include <optional>
@@ -32,34 +33,34 @@ class Lobe {
   virtual std::string model() const = 0;
 
   /// Everything eval depends on, as canonical text: model, parameters with full precision ("{:a}" hexadecimal floats),
-  /// but not the revision. Equal text means equal lobe.
+  /// but not the revision. Equal texts mean equal lobes.
   virtual std::string key() const = 0;
 
-  /// A short text for people, e.g. "ggx α 0.1, dielectric 1.5".
+  /// A short description for people, e.g. "ggx α 0.1, dielectric 1.5".
   virtual std::string summary() const = 0;
 
-  /// Raised when the code of the model changes what eval returns; a cache of another revision is stale.
+  /// Increased whenever the code changes what eval returns; caches of other revisions are out of date.
   virtual int revision() const = 0;
 
-  /// ρ(wo, wi) without the cosine, luminance for lobes with spectral parameters; 0 where either is not above the
-  /// surface.
+  /// ρ(wo, wi) without the cosine, in luminance for lobes with spectral parameters; 0 if either direction is not above
+  /// the surface.
   virtual double eval(const Vec3& wo, const Vec3& wi) const = 0;
 
-  /// Whether ρ stays the same when both directions are mirrored in the frame's x axis, and in its y axis: then the fits
-  /// of a quarter of the directions are enough.
+  /// Whether ρ is unchanged when both directions are mirrored in the xz plane or in the yz plane. Fits for one quadrant
+  /// of azimuths are then enough.
   virtual bool mirrorSymmetric() const { return false; }
 
-  /// Draws wi for wo.z > 0 from u uniform in [0,1)². nullopt: the sample has value zero (below the surface, say), and
-  /// counts as a sample.
+  /// Samples wi for wo.z > 0, with u uniform in [0,1)². nullopt is a sample of value zero (e.g. below the surface),
+  /// which estimators must count.
   virtual std::optional<LobeSample> sample(const Vec3& wo, const Vec2& u) const = 0;
 
-  /// The density of sample; 0 where it never draws.
+  /// Density of sample() over solid angle; 0 for directions that it never returns.
   virtual float pdf(const Vec3& wo, const Vec3& wi) const = 0;
 };
 
 using LobePtr = std::shared_ptr<const Lobe>;
 
-/// A lobe and the names of the materials that have it.
+/// A lobe and the names of the materials that contain it.
 struct LobeUse {
   LobePtr lobe;
   std::vector<std::string> materials;

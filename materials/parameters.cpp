@@ -11,11 +11,11 @@ namespace {
 constexpr const char* kKindNames[] = {"boolean", "number", "text", "colour", "transform", "texture"};
 
 [[noreturn]] void wrongKind(std::string_view name, const ParameterValue& value, const char* wanted) {
-  throw ParameterError(std::string(name), fmt::format("parameter \"{}\" is a {}, but a {} is needed", name,
+  throw ParameterError(std::string(name), fmt::format("parameter \"{}\" is of type {}, but type {} is needed", name,
                                                       kKindNames[value.index()], wanted));
 }
 
-/// Adds a value of any kind.
+/// Adds a parameter value of any type to a hash.
 struct FingerprintOfValue {
   Fingerprint& hash;
   void operator()(bool value) const { hash.number(value); }
@@ -114,7 +114,7 @@ TexturePtr Parameters::texture(std::string_view name, const Rgb& fallback) const
     if (const TexturePtr* value = std::get_if<TexturePtr>(&entry->value); value && !(*value)->constantColour())
       return *value;
   const Rgb constant = colour(name, fallback);
-  // Negated, so that it holds for what is no number.
+  // Negated, so that NaN is rejected, too.
   if (!((constant >= 0.0f).all() && constant.allFinite()))
     throw ParameterError(std::string(name), fmt::format("{} must be finite and not negative, but is {} {} {}", name,
                                                         constant.x(), constant.y(), constant.z()));

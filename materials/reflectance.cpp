@@ -6,22 +6,25 @@ namespace lobe {
 namespace {
 
 constexpr const char* kEnsure = "ensure_energy_conservation";
-// Mitsuba 0.6 leaves a little to absorption, so that light does not bounce for ever.
+// As in Mitsuba 0.6: slightly below 1, so that some light is absorbed at every bounce.
 constexpr float kScaledTo = 0.99f;
 
-/// What to multiply with where the largest component is as given; warns at the parameter, what says whose it is.
+/// The factor that scales a colour with the given largest component. Warns at the parameter `name`; the text of the
+/// warning starts with `what`.
 float conservingScale(const Parameters& parameters, const std::string& name, const std::string& what, float largest) {
   const bool decided = parameters.has(kEnsure);
   const bool scales = parameters.flag(kEnsure, false);
   if (!(largest > 1.0f) || (decided && !scales)) return 1.0f;
   if (!scales) {
     parameters.warn(
-        name, fmt::format("{} up to {:.4g}: above 1 more light is returned than arrives; it is kept", what, largest));
+        name, fmt::format("{} up to {:.4g}, but values above 1 create energy; it is kept (ensureEnergyConservation "
+                          "would scale it)",
+                          what, largest));
     return 1.0f;
   }
   const float scale = kScaledTo / largest;
-  parameters.warn(name, fmt::format("{} up to {:.4g}: above 1 more light would be returned than arrives; it is scaled "
-                                    "by {:.4g} (ensureEnergyConservation)",
+  parameters.warn(name, fmt::format("{} up to {:.4g}, but values above 1 create energy; it is scaled by {:.4g} "
+                                    "(ensureEnergyConservation)",
                                     what, largest, scale));
   return scale;
 }

@@ -14,7 +14,7 @@ struct Entry {
   BsdfPtr (*make)(const Parameters&);
 };
 
-// Sorted by name: knownBsdfs promises it.
+// Sorted by name, as knownBsdfs() guarantees.
 constexpr std::array kModels = {
     Entry{"blendbsdf", makeBlend},
     Entry{"bumpmap", makeBumpMap},
@@ -48,7 +48,8 @@ constexpr std::array kModels = {
 BsdfPtr makeBsdf(std::string_view type, const Parameters& parameters) {
   for (const Entry& entry : kModels)
     if (entry.type == type) return entry.make(parameters);
-  throw ParameterError("", fmt::format("unknown bsdf type \"{}\"; known are {}", type, fmt::join(knownBsdfs(), ", ")));
+  throw ParameterError(
+      "", fmt::format("unknown bsdf type \"{}\"; known types are {}", type, fmt::join(knownBsdfs(), ", ")));
 }
 
 std::vector<std::string> knownBsdfs() {

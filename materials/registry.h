@@ -1,5 +1,5 @@
 #pragma once
-// All reflectance models by the names scene files use.
+// All reflectance models, by their type names in scene files.
 
 #include <string>
 #include <string_view>
@@ -9,10 +9,11 @@
 
 namespace lobe {
 
-/// Makes the model registered under the type name ("roughplastic"). ParameterError: no such model, or bad parameters.
+/// Creates the model of a type name such as "roughplastic". Throws ParameterError for an unknown type or invalid
+/// parameters.
 BsdfPtr makeBsdf(std::string_view type, const Parameters& parameters);
 
-/// The type names makeBsdf knows, sorted.
+/// The type names that makeBsdf knows, sorted.
 std::vector<std::string> knownBsdfs();
 
 }  // namespace lobe

@@ -18,29 +18,29 @@ struct TextureRange {
 class Texture {
  public:
   virtual ~Texture() = default;
-  /// The linear colour at texture coordinate uv: any real numbers, the texture wraps as it is set to. v counts
-  /// downwards from an image's first row, as in Mitsuba; mesh readers hand out coordinates in this sense.
+  /// The linear colour at texture coordinates uv, which may be any real numbers; the wrap mode of the texture applies.
+  /// v increases downwards from the first row of an image, as in Mitsuba; mesh readers convert their coordinates to
+  /// this.
   virtual Rgb eval(const Vec2& uv) const = 0;
-  /// The same where a number is asked for, such as a roughness: the luminance, unless the texture tells numbers from
-  /// colours.
+  /// The value as a number, such as a roughness: the luminance, unless the texture distinguishes numbers from colours.
   virtual float evalNumber(const Vec2& uv) const { return luminance(eval(uv)); }
   /// The mean colour over one period, used for decisions that must not depend on where the surface is hit.
   virtual Rgb mean() const = 0;
-  /// Bounds of the colour's luminance over all uv, tight but for coloured scales of colours; equal for a constant.
+  /// Bounds of the luminance over all uv, tight except for coloured textures scaled by a colour; equal for a constant.
   virtual TextureRange range() const = 0;
-  /// The largest value of each component over all uv; a bound where textures are combined, else exact.
+  /// The maximum of each component over all uv; an upper bound for combined textures, otherwise exact.
   virtual Rgb largest() const = 0;
-  /// The colour of a texture that is made to have only one; nullopt for any other.
+  /// The colour of a constant texture; nullopt for all other textures, even if all their values are equal.
   virtual std::optional<Rgb> constantColour() const { return std::nullopt; }
-  /// Width and height in pixels, of which only the ratio counts: how wide a projector's picture is.
+  /// Width and height in pixels. Only their ratio is used, as the aspect ratio of a projector's image.
   virtual std::array<int, 2> resolution() const { return {1, 1}; }
-  /// Of all that eval depends on: textures that look the same because they are made alike have the same on every run.
+  /// Hash of everything eval depends on. Textures made from the same data have the same fingerprint in every run.
   virtual std::uint64_t fingerprint() const = 0;
 };
 
 using TexturePtr = std::shared_ptr<const Texture>;
 
-/// Greys of the numbers that a texture has, for who asks for colours.
+/// The numbers (evalNumber) of a texture as grey colours, for use where colours are needed.
 TexturePtr numbersOf(TexturePtr texture);
 
 /// The texture times the scale.

@@ -1,5 +1,5 @@
 #pragma once
-// What a camera's field of view means for a given image size.
+// Converts a camera's field of view for a given image size.
 
 #include "scenes/scene.h"
 

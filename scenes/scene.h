@@ -1,6 +1,6 @@
 #pragma once
-// A scene as plain data: what a reader produces and renderer and fitter consume. World units are the file's, unless it
-// is far from ordinary size (see Scene::scale).
+// A scene as plain data, produced by a reader and used by renderer and fitter. World units are those of the file,
+// unless the scene has been rescaled (see Scene::scale).
 
 #include <array>
 #include <cstdint>
@@ -33,22 +33,22 @@ struct Sphere {
   Vec3 centre;
   float radius;
   bool flipped = false;
-  /// Orthogonal: turns the sphere's own axes, which its texture coordinates follow, into the world.
+  /// Orthogonal matrix from the sphere's local frame, in which its texture coordinates are defined, to world space.
   Eigen::Matrix3f axes = Eigen::Matrix3f::Identity();
 };
 
-/// A flat ellipse: centre + x u + y v for x² + y² ≤ 1, where u and v are not parallel (conjugate radii, those of a disk
-/// if they are orthogonal and equally long); u × v is the front's direction unless flipped. uv: (r, φ/2π) for
-/// (x, y) = r (cosφ, sinφ), as Mitsuba has it.
+/// A flat ellipse: centre + x u + y v for x² + y² ≤ 1, where u and v are not parallel (conjugate semi-diameters; a disk
+/// if they are orthogonal and of equal length); u × v points to the front unless flipped. uv: (r, φ/2π) for (x, y) = r
+/// (cosφ, sinφ), as in Mitsuba.
 struct Disk {
   Vec3 centre;
   Vec3 u, v;
   bool flipped = false;
 };
 
-/// The side of a right circular cylinder, open at both ends: base + cosφ u + sinφ v + h axis with h in [0,1], where u
-/// and v are orthogonal to each other and to the axis, and as long as the radius. The outside is the front unless
-/// flipped. uv: (φ/2π, h).
+/// The lateral surface of a right circular cylinder, open at both ends: base + cosφ u + sinφ v + h axis with h in
+/// [0,1], where u and v are orthogonal to each other and to the axis, and their length is the radius. The outside is
+/// the front unless flipped. uv: (φ/2π, h).
 struct Cylinder {
   Vec3 base;
   Vec3 u, v;
@@ -56,7 +56,7 @@ struct Cylinder {
   bool flipped = false;
 };
 
-/// All shapes of a group, once more, somewhere else.
+/// A transformed copy of all shapes of a group.
 struct Instance {
   int group;                ///< index into Scene::groups
   Eigen::Affine3f toWorld;  ///< from the group's space; invertible
@@ -75,7 +75,8 @@ struct Shape {
   std::optional<AreaEmitter> emitter;
 };
 
-/// Shapes that are shown by instances only, in a space of their own. None is an instance, and none emits.
+/// Shapes that are visible only through instances, in a local space of the group. None of them is an instance or an
+/// emitter.
 struct ShapeGroup {
   std::vector<Shape> shapes;
 };
@@ -83,47 +84,47 @@ struct ShapeGroup {
 struct Material {
   std::string name;  ///< the file's id, or "unnamed-N"
   BsdfPtr bsdf;
-  /// Of what the BSDF was made from: equal for materials that are made alike, on every run.
+  /// Hash of everything that the BSDF is made from: equal for identically defined materials, in every run.
   std::uint64_t fingerprint = 0;
 };
 
-/// Radiance from infinitely far, in latitude-longitude form. The image point (u, v), v down, shows the radiance that
-/// arrives from local direction (sin(2πu) sin(πv), cos(πv), −cos(2πu) sin(πv)): +y is up (Mitsuba's convention).
+/// Radiance from infinitely far away, as a latitude-longitude map. The image point (u, v), v down, holds the radiance
+/// that arrives from local direction (sin(2πu) sin(πv), cos(πv), −cos(2πu) sin(πv)): +y is up (Mitsuba's convention).
 struct Environment {
   Image radiance;  ///< a 1×1 image for a constant environment; scale already applied
   Eigen::Matrix3f toWorld = Eigen::Matrix3f::Identity();  ///< rotation
 };
 
-/// Equal in all directions, from a point.
+/// A point light with the same intensity in all directions.
 struct PointLight {
   Vec3 position;
   Rgb intensity;  ///< power per solid angle
 };
 
-/// A texture in the way of light from a point. On the plane at distance 1 along the light's axis, the point at an
+/// A texture that modulates the light from a point. On the plane at distance 1 along the light's axis, the point at an
 /// offset o from the axis has the texture coordinates (½ + u·o, ½ + v·o).
 struct ProjectedTexture {
   TexturePtr texture;
-  Vec3 u, v;  ///< world space, at right angles to the axis and to each other
+  Vec3 u, v;  ///< world space, orthogonal to the axis and to each other
 
   Vec2 uvOf(const Vec3& axis, const Vec3& direction) const {
     return Vec2(u.dot(direction), v.dot(direction)) / axis.dot(direction) + Vec2::Constant(0.5f);
   }
 };
 
-/// A cone of light from a point: of full intensity up to beamWidth from its axis, then falling linearly with the angle
-/// to nothing at the cutoff (Mitsuba's).
+/// A point light restricted to a cone: full intensity up to the angle beamWidth from the axis, then a linear falloff in
+/// the angle to zero at the cutoff, as in Mitsuba.
 struct SpotLight {
   Vec3 position;
   Vec3 direction;                                          ///< unit, the axis
   Rgb intensity;                                           ///< power per solid angle, on the axis
   float cutoff;                                            ///< half angle in radians, in (0, π]
-  float beamWidth;                                         ///< likewise, at most the cutoff
-  std::optional<ProjectedTexture> texture = std::nullopt;  ///< times the intensity; only where the cutoff is below π/2
+  float beamWidth;                                         ///< half angle in radians, at most the cutoff
+  std::optional<ProjectedTexture> texture = std::nullopt;  ///< scales the intensity; only if the cutoff is below π/2
 };
 
-/// Projects the unit square of a texture: on a plane at right angles to the axis, at distance 1, the irradiance is π
-/// times scale times the texture (Mitsuba's, so that a white plane there shows the texture).
+/// Projects the unit square of a texture: on a plane orthogonal to the axis at distance 1, the irradiance is π times
+/// scale times the texture, as in Mitsuba, so that a white diffuse plane there shows the texture.
 struct ProjectorLight {
   Vec3 position;
   Vec3 direction;  ///< unit, the axis
@@ -131,22 +132,22 @@ struct ProjectorLight {
   ProjectedTexture image;
 };
 
-/// Parallel light from infinitely far.
+/// Parallel light from infinitely far away.
 struct DirectionalLight {
-  Vec3 direction;  ///< unit, the way the light goes
-  Rgb irradiance;  ///< on a surface that faces it
+  Vec3 direction;  ///< unit, in which the light propagates
+  Rgb irradiance;  ///< on a surface orthogonal to the direction
 };
 
 /// Lights that no ray can hit.
 using DeltaLight = std::variant<PointLight, SpotLight, DirectionalLight, ProjectorLight>;
 
-/// A part of a film, in pixels from its top left corner.
+/// A rectangle of a film, in pixels from its top left corner.
 struct FilmCrop {
   int x, y, width, height;
 };
 
 /// Local +z is the viewing direction, +y up, +x left (Mitsuba's convention). An orthographic camera sees the local x
-/// from −1 to 1, and as much of y as the film's shape makes of it.
+/// from −1 to 1, and a range of y that follows from the aspect ratio of the film.
 struct Camera {
   enum class Kind { perspective, thinlens, orthographic } kind = Kind::perspective;
   Eigen::Matrix4f toWorld = Eigen::Matrix4f::Identity();
@@ -154,36 +155,36 @@ struct Camera {
                              ///< size below)
   int width = 768;           ///< of the film, in pixels
   int height = 576;
-  std::optional<FilmCrop> crop;  ///< what is rendered of it
-  /// A film point shows what the point moved by this much (to the right and down) would show without; fractions of the
-  /// film's width and height.
+  std::optional<FilmCrop> crop;  ///< part of the film that is rendered
+  /// Principal point offset: a film point shows what the point displaced by this vector (to the right and down) would
+  /// show without the offset. In fractions of the film's width and height.
   Vec2 shift = Vec2::Zero();
-  float apertureRadius = 0;  ///< of a thin lens, in units of the camera's frame, as is:
-  float focusDistance = 1;   ///< of the plane in focus from the lens, along +z
-  /// What lies nearer or farther along +z, in units of the camera's frame, is not seen.
+  float apertureRadius = 0;  ///< of a thin lens, in units of the camera's local frame
+  float focusDistance = 1;   ///< from the lens to the focal plane along +z, in the same units
+  /// Clipping distances along +z, in units of the camera's local frame.
   float nearClip = 0;
   float farClip = std::numeric_limits<float>::infinity();
-  /// The field of view as the file states it, to convert again when the size is overridden.
+  /// The field of view as given in the file; it is converted again when the film size is overridden.
   float fov = 60;
   std::string fovAxis = "x";
 
-  /// The part of the film that becomes the picture.
+  /// The part of the film that is rendered.
   FilmCrop picture() const { return crop.value_or(FilmCrop{0, 0, width, height}); }
 };
 
-/// The reconstruction filter that the file asks for; sampled by importance, so each sample touches one pixel.
+/// The reconstruction filter that the file requests. It is importance-sampled, so each sample contributes to one pixel.
 struct PixelFilter {
   enum class Kind { box, tent, gaussian, mitchell, lanczos } kind = Kind::box;
   float radius = 0.5f;                     ///< pixels
   float stddev = 0.5f;                     ///< of the Gaussian
-  float b = 1.0f / 3.0f, c = 1.0f / 3.0f;  ///< Mitchell's and Netravali's parameters
+  float b = 1.0f / 3.0f, c = 1.0f / 3.0f;  ///< of the Mitchell–Netravali filter
 };
 
-/// How emitters look where the camera sees them directly, not by reflection or refraction.
+/// How emitters appear when the camera sees them directly, not by reflection or refraction.
 enum class EmitterVisibility {
   shown,
-  dark,   ///< they do not emit towards the camera, and shapes that emit are seen as what they are made of
-  hidden  ///< nor are shapes that emit seen: the camera sees what is behind them
+  dark,   ///< they do not emit towards the camera; emitting shapes show only their material
+  hidden  ///< emitting shapes are invisible, too: the camera sees what is behind them
 };
 
 struct Scene {
@@ -191,14 +192,14 @@ struct Scene {
   std::vector<ShapeGroup> groups;
   std::vector<Material> materials;
   std::optional<Environment> environment;
-  std::vector<DeltaLight> lights;  ///< besides the emitting shapes
+  std::vector<DeltaLight> lights;  ///< except emitting shapes
   Camera camera;
   PixelFilter filter;
-  std::optional<int> maxDepth;  ///< longest path in segments, 0 or more, as the file says
+  std::optional<int> maxDepth;  ///< maximum path length in segments, 0 or more, from the file
   EmitterVisibility emitterVisibility = EmitterVisibility::shown;
-  float scale = 1;                    ///< what all lengths of the file have been multiplied by, a power of two
-  std::vector<std::string> notes;     ///< what was read but replaced by ours (integrators, samplers, film options)
-  std::vector<std::string> warnings;  ///< what was not taken as it stands, and what lenient reading passed over
+  float scale = 1;                    ///< power of two by which all lengths of the file were multiplied
+  std::vector<std::string> notes;     ///< what was read but has no effect (integrators, samplers, film options)
+  std::vector<std::string> warnings;  ///< what was not read as written, and what lenient reading left out
 };
 
 }  // namespace lobe

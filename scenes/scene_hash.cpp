@@ -6,7 +6,7 @@
 namespace lobe {
 namespace {
 
-// To be raised when the same scene comes to mean another light.
+// Increase this when the same scene data starts to produce different light.
 constexpr std::uint32_t kRevision = 2;
 
 struct GeometryHash {
@@ -79,7 +79,7 @@ std::uint64_t hashOf(const Shape& shape, const std::vector<Material>& materials)
   return hash.value();
 }
 
-/// Meshes are large: each by itself, in parallel.
+/// Hashes the shapes in parallel, because meshes are large.
 void addShapes(Fingerprint& hash, const std::vector<Shape>& shapes, const std::vector<Material>& materials) {
   std::vector<std::uint64_t> hashes(shapes.size());
   parallelFor(std::size_t{0}, shapes.size(), [&](std::size_t i) { hashes[i] = hashOf(shapes[i], materials); });

@@ -1,5 +1,5 @@
 #pragma once
-// Tells scenes apart by their light, and by the picture they make.
+// Hashes of everything in a scene that determines its light transport, or its picture.
 
 #include <cstdint>
 
@@ -7,12 +7,13 @@
 
 namespace lobe {
 
-/// Equal for scenes in which the same light travels, on every run and any number of threads: of shapes, instances,
-/// materials with their textures, and emitters in the order of the file; not of camera, film, names and depth. Scenes
-/// described in different words may differ.
+/// Hash of everything that determines the light transport: shapes, instances, materials with their textures, and
+/// emitters, in the order of the file; but not camera, film, names and maximum depth. It is the same in every run and
+/// for any number of threads. Equivalent scenes that are described differently may have different hashes.
 std::uint64_t lightHash(const Scene& scene);
 
-/// The same of light, camera, film and its filter: of scenes that make the same picture.
+/// Hash of the light transport together with camera, film, pixel filter, maximum depth and emitter visibility: equal
+/// for scenes that produce the same picture.
 std::uint64_t pictureHash(const Scene& scene);
 
 }  // namespace lobe

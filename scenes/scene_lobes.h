@@ -1,5 +1,5 @@
 #pragma once
-// The lobes that a scene needs caches of.
+// Collects the lobes of a scene, for which caches are fitted.
 
 #include <vector>
 

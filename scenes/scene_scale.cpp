@@ -7,7 +7,7 @@
 namespace lobe {
 namespace {
 
-// Within these, products of four lengths are floats with room to spare on both sides.
+// Within this range of exponents, products of four lengths stay well inside the range of floats.
 constexpr int kSmallestExponent = -13;
 constexpr int kLargestExponent = 27;
 
@@ -66,7 +66,7 @@ double largestCoordinate(const Box& box) {
   return box.isEmpty() ? 0 : box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff();
 }
 
-/// The power of two that brings a length of this size into range; 1 for those within it, and for zero.
+/// The power of two that brings a length of this size into range; 1 for lengths within it and for zero.
 float factorFor(double size) {
   if (!(size > 0)) return 1;
   const int exponent = std::ilogb(size);
@@ -78,7 +78,7 @@ void scaleShapes(std::vector<Shape>& shapes, float factor) {
   for (Shape& shape : shapes) std::visit(Scaling{factor}, shape.geometry);
 }
 
-/// Scales what each group holds by its own factor, and what shows it back.
+/// Scales the shapes of each group by the group's own factor and its instances by the inverse.
 void scaleGroups(Scene& scene) {
   std::vector<float> factors;
   for (ShapeGroup& group : scene.groups) {
@@ -90,8 +90,8 @@ void scaleGroups(Scene& scene) {
       instance->toWorld.linear() /= factors[static_cast<std::size_t>(instance->group)];
 }
 
-/// The matrix keeps the size of one, which rays' directions need, and lengths in the camera's frame change instead; an
-/// orthographic film is as large as the matrix makes it.
+/// Keeps the entries of the matrix near 1, as ray directions require, and scales the lengths in the camera's frame
+/// instead. The film of an orthographic camera has the size given by the matrix.
 void scaleCamera(Camera& camera, float factor) {
   auto linear = camera.toWorld.topLeftCorner<3, 3>();
   camera.toWorld.topRightCorner<3, 1>() *= factor;
@@ -113,7 +113,7 @@ struct LightScaling {
     light.scale = brightness.x();
   }
 
-  /// So that the irradiance, which falls with the square of the distance, is the same.
+  /// Scales the intensity with the square of lengths, which keeps the irradiance.
   void scale(Vec3& position, Rgb& intensity) const {
     position *= factor;
     intensity = (intensity.cast<double>() * (static_cast<double>(factor) * factor)).cast<float>();

@@ -9,7 +9,7 @@ namespace lobe {
 namespace {
 
 constexpr double kWeightTolerance = 1e-4;
-// Single precision loses the determinant of anything flatter.
+// The determinant of a more elongated covariance is not accurate in single precision.
 constexpr double kMinRelativeDeterminant = 1e-7;
 
 void checkComponent(const CacheComponent& c, std::size_t index, const std::string& name) {

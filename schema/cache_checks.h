@@ -1,6 +1,6 @@
 #pragma once
-// What all cache files have in common besides their container: buffers and structs read in place, and mixtures that
-// have to make sense. Faults throw std::runtime_error, "NAME: damaged: what is wrong".
+// Checks shared by the readers of all cache files: FlatBuffers and structs that are read in place, and the validity of
+// mixtures. A failed check throws std::runtime_error with the message "NAME: damaged: what is wrong".
 
 #include <initializer_list>
 #include <span>
@@ -13,20 +13,21 @@
 
 namespace lobe {
 
+/// Throws the error of a damaged file.
 [[noreturn]] void refuseDamaged(const std::string& name, std::string_view fault);
 
 bool allFinite(std::initializer_list<float> values);
 
-/// Finite numbers, weights that are not negative, positive definite covariances.
+/// Throws unless all numbers are finite, weights are not negative, and covariances are positive definite.
 void checkComponents(std::span<const CacheComponent> components, const std::string& name);
 
 bool componentsInRange(std::uint32_t first, std::uint32_t count, std::span<const CacheComponent> all);
 bool weightsSumToOne(std::span<const CacheComponent> mixture);
 
-/// Throws unless a FlatBuffer of this size may begin there.
+/// Throws unless the size and alignment of the payload are valid for a FlatBuffer.
 void checkBufferPlace(std::span<const std::byte> payload, const std::string& name);
 
-/// The table at the root of a payload, its structure verified. what: for messages.
+/// Verifies the structure of a payload and returns its root table. `what` names the file type in messages.
 template <class Root>
 const Root& verifiedBuffer(std::span<const std::byte> payload, const std::string& name, const std::string& what) {
   checkBufferPlace(payload, name);
@@ -36,7 +37,7 @@ const Root& verifiedBuffer(std::span<const std::byte> payload, const std::string
   return *flatbuffers::GetRoot<Root>(data);
 }
 
-/// The elements of a vector of structs where they lie.
+/// A view of a FlatBuffers vector of structs, without copying.
 template <class To, class From>
 std::span<const To> inPlace(const flatbuffers::Vector<const From*>& vector) {
   static_assert(sizeof(To) == sizeof(From) && alignof(To) == alignof(From));

@@ -46,7 +46,7 @@ std::uint64_t contentHash(const Header& header, std::span<const std::byte> paylo
   refuse(path.string(), fmt::format("cannot open: {}", fault));
 }
 
-/// Letters only: the bytes may be anything, and the message goes to a terminal.
+/// Replaces unprintable characters, because the message may be written to a terminal.
 std::string printable(const char (&kind)[4]) {
   std::string text(kind, sizeof(kind));
   for (char& c : text)

@@ -1,11 +1,11 @@
 #pragma once
-// The container of every cache file: a 32-byte header that tells what the file is and proves that it is whole, then the
-// payload (a FlatBuffer). Little-endian.
+// The container of all cache files: a 32-byte header that identifies the file type and allows to verify its integrity,
+// followed by the payload (a FlatBuffer). Little-endian.
 //
 //   offset 0   magic "LOBEBRDF" (the last four letters are the kind)
 //          8   format version: major u16, minor u16, then 4 zero bytes
 //         16   payload size u64
-//         24   XXH3-64 of the payload, seeded with bytes 0 to 23 hashed the same way
+//         24   XXH3-64 of the payload, seeded with the XXH3-64 of bytes 0 to 23
 
 #include <array>
 #include <cstddef>
@@ -18,13 +18,13 @@
 
 namespace lobe {
 
-/// What a file holds, and the version of it that this program writes and reads.
+/// A file type, and the version of its format that this program writes and reads.
 struct FileFormat {
   std::array<char, 4> kind;
   std::uint16_t major, minor;
 };
 
-/// Its kind as text.
+/// The kind as text.
 inline std::string_view nameOf(const FileFormat& format) {
   return {format.kind.data(), format.kind.size()};
 }
@@ -32,7 +32,7 @@ inline std::string_view nameOf(const FileFormat& format) {
 /// A read-only memory map of a whole file. Move-only.
 class MappedFile {
  public:
-  /// Throws std::runtime_error that names the file.
+  /// Throws std::runtime_error that names the file if it cannot be opened or is not a regular file.
   explicit MappedFile(const std::filesystem::path& path);
   MappedFile(MappedFile&& other) noexcept;
   MappedFile& operator=(MappedFile&& other) noexcept;
@@ -44,25 +44,25 @@ class MappedFile {
   std::size_t size_ = 0;
 };
 
-/// Header and payload as the bytes of a file.
+/// The bytes of a file: header and payload.
 std::vector<std::byte> wrapPayload(const FileFormat& format, std::span<const std::byte> payload);
 
-/// Checks magic, kind, version, size and hash, in this order, and returns the payload (8-byte aligned where bytes are).
-/// Throws std::runtime_error: "NAME: what is wrong and what to do". A newer minor version is read, a newer major
-/// refused.
+/// Checks magic, kind, version, size and hash, in this order, and returns the payload, which is 8-byte aligned if
+/// `bytes` is. Any minor version is accepted; another major version is refused. Throws std::runtime_error with the
+/// message "NAME: what is wrong", and what to do about another version.
 std::span<const std::byte> unwrapPayload(const FileFormat& format, std::span<const std::byte> bytes,
                                          const std::string& name);
 
-/// What the header says.
+/// Version and hash from the header.
 struct ContainerHeader {
   std::uint16_t major, minor;
-  std::uint64_t hash;  ///< of the whole content
+  std::uint64_t hash;  ///< hash of the whole content
 };
 
-/// Of bytes that unwrapPayload has accepted.
+/// The header of bytes that unwrapPayload has accepted.
 ContainerHeader containerHeader(std::span<const std::byte> bytes);
 
-/// Whether bytes begin as a file of this kind does, of whatever version and however damaged further on.
+/// Whether the bytes begin like a file of this kind. Neither the version nor the remaining content is checked.
 bool isOfKind(const FileFormat& format, std::span<const std::byte> bytes);
 
 /// XXH3-64 of text.

@@ -33,14 +33,14 @@ void checkRecord(const StoredIllumination& r, std::size_t index, std::span<const
   };
   require(allFinite({r.position[0], r.position[1], r.position[2], r.radius, r.irradiance, r.samples}),
           "a number is not finite");
-  // Written so that what is not finite fails.
+  // These conditions are false for numbers that are not finite.
   require(isUnit(r.normal) && isUnit(r.tangent) && std::abs(dot(r.normal, r.tangent)) <= kFrameTolerance,
-          "normal and tangent are not a frame's");
+          "normal and tangent are not orthonormal");
   require(r.radius > 0, "the radius is not positive");
-  require(r.background >= 0 && r.background <= 1, "share of the background out of range");
+  require(r.background >= 0 && r.background <= 1, "weight of the background out of range");
   require(r.irradiance >= 0, "a negative irradiance");
   require(r.samples >= 0, "a negative number of samples");
-  require(r.bsdfFraction > 0 && r.bsdfFraction < 1, "share of the BSDF out of range");
+  require(r.bsdfFraction > 0 && r.bsdfFraction < 1, "BSDF sampling fraction out of range");
   require(r.count <= kMaxStoredComponents, "number of components out of range");
   require(componentsInRange(r.first, r.count, components), "components out of range");
   require(r.count == 0 || weightsSumToOne(components.subspan(r.first, r.count)), "the weights do not sum to one");
@@ -64,18 +64,19 @@ IlluminationFile::IlluminationFile(MappedFile file, const std::filesystem::path&
   const std::string name = path.string();
   const std::span<const std::byte> payload = unwrapPayload(kIlluminationFormat, file_.bytes(), name);
   header_ = containerHeader(file_.bytes());
-  const auto& root = verifiedBuffer<fb::Illumination>(payload, name, "trained illumination");
+  const auto& root = verifiedBuffer<fb::Illumination>(payload, name, "trained illumination file");
   info_ = readInfo(root);
   records_ = inPlace<StoredIllumination>(*root.records());
   components_ = inPlace<CacheComponent>(*root.components());
   if (!(info_.unit > 0 && std::isfinite(info_.unit))) refuseDamaged(name, "the unit of length is not positive");
   if (!(info_.undersampledFraction >= 0 && info_.undersampledFraction <= 1))
-    refuseDamaged(name, "share of undersampled records out of range");
+    refuseDamaged(name, "fraction of undersampled records out of range");
   checkComponents(components_, name);
   for (std::size_t i = 0; i < records_.size(); ++i) {
     checkRecord(records_[i], i, components_, name);
-    // The look-up table has a cell a unit: a radius of many would fill the memory.
-    if (records_[i].radius > info_.unit) refuseDamaged(name, fmt::format("record {}: radius over the unit", i));
+    // The cell size of the look-up follows from the unit, so that a much larger radius would exhaust the memory.
+    if (records_[i].radius > info_.unit)
+      refuseDamaged(name, fmt::format("record {}: radius over the unit of length", i));
   }
 }
 

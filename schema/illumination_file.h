@@ -1,6 +1,5 @@
 #pragma once
-// The illumination cache on disk (".illum"): what was learnt about one scene's light. See illumination.fbs for the
-// meaning of each number.
+// The file format of trained illumination (".illum"). See illumination.fbs for the meaning of each number.
 
 #include <array>
 #include <cstdint>
@@ -15,26 +14,27 @@ namespace lobe {
 
 inline constexpr FileFormat kIlluminationFormat{{'I', 'L', 'L', 'U'}, 2, 1};
 
-/// Read in place: the layout is the schema's (checked when compiled, the order of the fields by a test). A new field
-/// goes here, into illumination.fbs, the checks of illumination_file.cpp and runtime/guiding/illumination_store.cpp.
+/// A record, read in place: the layout equals that of the schema (size checked at compile time, order of the fields by
+/// a test). A new field must be added here, to illumination.fbs, to the checks in illumination_file.cpp, and to
+/// runtime/guiding/illumination_store.cpp.
 struct StoredIllumination {
   std::array<float, 3> position, normal, tangent;
   float radius, background, irradiance, samples, bsdfFraction;
   std::uint32_t first, count;
 };
 
-/// Largest number of components of a record that a file may hold.
+/// Largest number of components of a record in a file.
 inline constexpr std::uint32_t kMaxStoredComponents = 8;
 
 struct StoredTrainingSettings {
   std::string from = "both";
   std::uint32_t passes = 0, photons = 0, importons = 0, components = 0;
   std::uint64_t seed = 0;
-  bool learntFractions = false;  ///< bsdfFraction is each record's own
+  bool learntFractions = false;  ///< whether bsdfFraction was learnt for each record
   bool operator==(const StoredTrainingSettings&) const = default;
 };
 
-/// What a file says of itself.
+/// The metadata of a file.
 struct IlluminationInfo {
   std::string toolVersion, scene;
   std::uint64_t sceneHash = 0;
@@ -44,12 +44,12 @@ struct IlluminationInfo {
   float unit = 1;
 };
 
-/// An open file: mapped, checked, with its records in place. Immutable; move-only.
+/// An open file, memory-mapped and validated. Immutable and move-only.
 class IlluminationFile {
  public:
-  /// Maps, verifies the structure, then the meaning: indices in range, unit normals and tangents, positive radii,
-  /// weights that sum to one, positive definite covariances, finite numbers. Throws std::runtime_error that names the
-  /// file and the fault.
+  /// Maps the file and checks its structure and content: indices in range, orthonormal normals and tangents, positive
+  /// radii, weights that sum to one, positive definite covariances, finite numbers. Throws std::runtime_error that
+  /// names the file and the fault.
   static IlluminationFile open(const std::filesystem::path& path);
 
   const IlluminationInfo& info() const { return info_; }
@@ -69,7 +69,7 @@ class IlluminationFile {
   ContainerHeader header_{};
 };
 
-/// The bytes of a file; the same input gives the same bytes.
+/// The bytes of a file. Equal input gives equal bytes.
 std::vector<std::byte> encodeIllumination(const IlluminationInfo& info, std::span<const StoredIllumination> records,
                                           std::span<const CacheComponent> components);
 

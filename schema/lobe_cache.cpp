@@ -8,8 +8,8 @@
 namespace lobe {
 namespace {
 
-// The structs of the schema have private fields, so sizes and alignments are compared here, and the order of the fields
-// by a test that writes with one and reads with the other.
+// The fields of the generated structs are private, so that only sizes and alignments can be compared here. A test
+// writes with one type and reads with the other to check the order of the fields.
 static_assert(sizeof(CacheComponent) == sizeof(fb::Component) && alignof(CacheComponent) == alignof(fb::Component));
 static_assert(sizeof(CacheRecord) == sizeof(fb::Record) && alignof(CacheRecord) == alignof(fb::Record));
 static_assert(std::is_trivially_copyable_v<CacheComponent> && std::is_standard_layout_v<CacheComponent>);
@@ -27,7 +27,7 @@ void checkRecord(const CacheRecord& r, std::size_t index, std::span<const CacheC
   require(r.integral >= 0 && r.albedo >= 0 && r.nev >= 0 && r.nevCoverage >= 0 && r.worstRatio >= 0,
           "a negative quantity");
   require((r.cosineMass > 0 || r.count == 0) && r.cosineMass <= 1.0001f, "cosine mass out of range");
-  require(r.outside >= 0 && r.outside <= 1, "share outside the disc out of range");
+  require(r.outside >= 0 && r.outside <= 1, "fraction outside the disc out of range");
   require(r.count <= kMaxCacheComponents, "number of components out of range");
   if (r.count == 0) return;
   require(componentsInRange(r.first, r.count, components), "components out of range");
@@ -95,7 +95,7 @@ std::vector<std::byte> encodeLobeCache(const LobeCacheInfo& info, std::span<cons
   const FitSettings& s = info.settings;
   const auto settings = fb::CreateFitSettings(builder, builder.CreateString(nameOf(s.method)), s.components, s.samples,
                                               s.reduction, s.revision, s.quality, s.fixedGrid);
-  // One after the other: the order in which arguments of a call are evaluated is the compiler's choice.
+  // In separate statements, because the order of evaluation of function arguments is unspecified.
   const auto toolVersion = builder.CreateString(info.toolVersion);
   const auto model = builder.CreateString(info.model);
   const auto key = builder.CreateString(info.key);

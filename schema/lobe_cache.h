@@ -1,5 +1,5 @@
 #pragma once
-// The BRDF cache: one fitted lobe in one file. See lobe.fbs for the meaning of each number.
+// The file format of BRDF caches (".lobe"), one file per lobe. See lobe.fbs for the meaning of each number.
 
 #include <array>
 #include <cstdint>
@@ -16,7 +16,7 @@ namespace lobe {
 
 inline constexpr FileFormat kLobeFormat{{'B', 'R', 'D', 'F'}, 3, 0};
 
-// These two are read in place: their layout is the schema's (checked when compiled).
+// Read in place: the layout of these structs equals that of the schema (size checked at compile time).
 struct CacheComponent {
   float weight, meanX, meanY, covXX, covXY, covYY;
 };
@@ -25,7 +25,7 @@ struct CacheRecord {
   float integral, albedo, cosineMass, outside, nev, nevCoverage, worstRatio;
 };
 
-/// How the records of a cache were fitted; lobe_fit.h says what each is.
+/// The method by which the records of a cache were fitted; see lobe_fit.h.
 enum class FitMethod { automatic, wem, ceres, eq8 };
 inline constexpr std::array<const char*, 4> kFitMethodNames{"auto", "wem", "ceres", "eq8"};
 inline const char* nameOf(FitMethod method) {
@@ -39,26 +39,27 @@ struct FitSettings {
   std::uint32_t samples = 4096;
   float reduction = 0.1f;
   std::uint32_t revision = 1;
-  float quality = 0;      ///< of method auto: an NEV that is good enough
-  bool fixedGrid = true;  ///< a record for every entry of the grid, whether it needs one or not
+  float quality = 0;      ///< target relative variance (NEV) of the method auto
+  bool fixedGrid = true;  ///< whether every entry of the grid has its own record
   bool operator==(const FitSettings&) const = default;
 };
 
-/// What a cache says of itself.
+/// The metadata of a cache.
 struct LobeCacheInfo {
   std::string toolVersion, model, key, summary;
   int modelRevision = 0;
   FitSettings settings;
   std::uint8_t gridKind = 0;  ///< GridKind
   std::uint32_t gridCount = 0;
-  bool quarter = false;  ///< of the directions: to be looked up by Mirror::intoQuadrant, and mirrored back
+  bool quarter = false;  ///< directions must be mirrored by Mirror::intoQuadrant, and mixtures mirrored back
 };
 
-/// An open cache: the mapped file, checked, with its records in place. Immutable; move-only.
+/// An open cache, memory-mapped and validated. Immutable and move-only.
 class LobeCache {
  public:
-  /// Maps, verifies the structure, then the meaning: a look-up per grid entry, indices in range, weights that sum to
-  /// one, positive definite covariances, finite numbers. Throws std::runtime_error that names the file and the fault.
+  /// Maps the file and checks its structure and content: one look-up per grid entry, indices in range, weights that sum
+  /// to one, positive definite covariances, finite numbers. Throws std::runtime_error that names the file and the
+  /// fault.
   static LobeCache open(const std::filesystem::path& path);
 
   const LobeCacheInfo& info() const { return info_; }
@@ -67,10 +68,10 @@ class LobeCache {
   std::span<const CacheComponent> components(const CacheRecord& r) const {
     return components_.subspan(r.first, r.count);
   }
-  /// The record that serves an entry of the grid, entry < info().gridCount.
+  /// The index of the record for an entry of the grid, entry < info().gridCount.
   std::uint32_t lookup(std::uint32_t entry) const { return lookup_[entry]; }
-  std::uint64_t hash() const { return header_.hash; }  ///< of the whole content
-  /// The file's format version.
+  std::uint64_t hash() const { return header_.hash; }  ///< hash of the whole content
+  /// Format version and hash.
   const ContainerHeader& header() const { return header_; }
   std::size_t bytes() const { return file_.bytes().size(); }
 
@@ -84,14 +85,14 @@ class LobeCache {
   ContainerHeader header_{};
 };
 
-/// Largest number of components of a record that a cache may hold.
+/// Largest number of components of a record in a cache.
 inline constexpr std::uint32_t kMaxCacheComponents = 32;
 
-/// The file name for a lobe: "MODEL-HASH.lobe", from the key only, so that renderer and fitter find the same file
-/// whatever the settings of the fit.
+/// The file name of a lobe, "MODEL-HASH.lobe". It does not depend on the settings of the fit, so that renderer and
+/// fitter always use the same name.
 std::string lobeFileName(const std::string& model, const std::string& key);
 
-/// The bytes of a cache file; the same input gives the same bytes.
+/// The bytes of a cache file. Equal input gives equal bytes.
 std::vector<std::byte> encodeLobeCache(const LobeCacheInfo& info, std::span<const CacheRecord> records,
                                        std::span<const CacheComponent> components,
                                        std::span<const std::uint32_t> lookup);

@@ -1,7 +1,8 @@
-// A path tracer on spheres that compares BSDF sampling, guiding by the illumination that a lobe::Field has learnt, and
-// the product of that illumination with a glossy lobe, at the same number of samples. It has no next-event estimation,
-// so that all light has to be found by chance or by guiding: a hidden lamp lights a room of diffuse and glossy spheres
-// indirectly.
+// A path tracer for spheres that compares three ways of sampling directions at the same number of samples: BSDF
+// sampling
+// ("plain"), the illumination learnt by a lobe::Field ("guided"), and the product of that illumination with a glossy
+// lobe ("product"). In the scene, an occluded lamp illuminates a room with diffuse and glossy spheres indirectly. There
+// is no next-event estimation, so that directional sampling must find all light.
 
 #include <algorithm>
 #include <cmath>
@@ -51,13 +52,13 @@ Float3 grey(float value) {
   return {value, value, value};
 }
 
-/// Its BSDF is diffuse · kInvPi + glossy · glossyLobe.
+/// A sphere with the BSDF diffuse / π + glossy · glossyLobe; emission is radiance.
 struct Sphere {
   Float3 centre;
   float radius, diffuse, glossy, emission;
 };
 
-// The room is the inside of the first sphere. The last hides the lamp from the camera and from most of the room.
+// The room is the inside of the first sphere. The last sphere occludes the lamp from the camera and most of the room.
 const std::vector<Sphere> kSpheres = {{{0, 0, 0}, 4, 0.7f, 0, 0},
                                       {{-1.2f, -1, 0.5f}, 0.9f, 0.6f, 0, 0},
                                       {{1.1f, -1.2f, 0.4f}, 1.1f, 0.1f, 0.8f, 0},
@@ -66,7 +67,7 @@ const std::vector<Sphere> kSpheres = {{{0, 0, 0}, 4, 0.7f, 0, 0},
 
 struct Hit {
   float distance;
-  Float3 position, normal;  // on the side of the ray
+  Float3 position, normal;  // normal: unit, on the side of the ray
   const Sphere* sphere;
 };
 
@@ -105,7 +106,7 @@ struct Frame {
   Float3 toLocal(Float3 v) const { return {dot(v, s), dot(v, t), dot(v, n)}; }
 };
 
-// The glossy lobe: Phong's, normalised to an albedo below one (Lafortune and Willems 1994).
+// The glossy lobe: the normalised Phong model, with an albedo below one (Lafortune and Willems 1994).
 constexpr float kExponent = 60;
 
 Float3 mirrored(Float3 wo) {
@@ -128,7 +129,7 @@ Float3 sampleGlossy(Float3 wo, Float2 u) {
   return Frame(mirrored(wo)).toWorld({sine * std::cos(phi), sine * std::sin(phi), cosine});
 }
 
-/// The lobe as the fit needs it.
+/// The lobe as input of lobe::compileLobe.
 lobe::LobeFunctions lobeFunctions() {
   lobe::LobeFunctions functions;
   functions.model = "phong";
@@ -143,7 +144,7 @@ lobe::LobeFunctions lobeFunctions() {
   return functions;
 }
 
-/// The BSDF of a sphere at a point, seen from wo (local).
+/// The BSDF of a sphere for a given wo, in the local frame.
 struct Bsdf {
   float diffuse, glossy;
   Float3 wo;
@@ -165,7 +166,7 @@ struct Direction {
   float pdf, bsdfPdf;
 };
 
-/// Chooses between the BSDF's sampler and the mixtures; the density is that of both together.
+/// Samples a direction with the BSDF's sampler or the guiding distribution; pdf is the density of their combination.
 std::optional<Direction> sampleDirection(const Bsdf& bsdf, const lobe::SurfaceDistribution* guide, Random& random) {
   float choice = random();
   const Float2 u{random(), random()};
@@ -183,13 +184,14 @@ std::optional<Direction> sampleDirection(const Bsdf& bsdf, const lobe::SurfaceDi
   return Direction{wi, guide ? guide->bsdfProbability() * bsdfPdf + guide->guidedPdf(wi) : bsdfPdf, bsdfPdf};
 }
 
-/// What guides a path: nothing, the illumination, or its product with the compiled lobe.
+/// How paths are guided: not at all (no field), by illumination (no caches), or by the product.
 struct Guide {
   const lobe::Field* field = nullptr;
   const lobe::LobeCacheSet* caches = nullptr;
 };
 
-/// The radiance along a ray. recorder: told of the path where training wants it, with the storage that it writes to.
+/// Estimates the radiance along a ray with one path. storage and recorder are given in training only: requests for
+/// records and the vertices of the path are added to them.
 float radiance(Float3 origin, Float3 direction, const Guide& guide, lobe::SampleStorage* storage,
                lobe::PathRecorder* recorder, Random& random) {
   float result = 0, throughput = 1;
@@ -235,7 +237,7 @@ float radiance(Float3 origin, Float3 direction, const Guide& guide, lobe::Sample
 }
 
 struct Estimate {
-  double mean, variance;  // of one sample
+  double mean, variance;  // variance of one sample
 };
 
 constexpr Float3 kCamera{0, -0.5f, 3.5f};
@@ -299,7 +301,7 @@ int main() {
   print("plain", plain);
   print("guided", guided);
   print("product", product);
-  // The means agree within their noise, and each method is better than the one before it.
+  // The means must agree within their noise, and each method must have a lower variance than the previous one.
   const auto agree = [&](const Estimate& e) {
     return std::abs(plain.mean - e.mean) < 4 * std::sqrt((plain.variance + e.variance) / kSamples);
   };

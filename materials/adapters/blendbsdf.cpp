@@ -1,4 +1,4 @@
-// Fades from one model to another by a texture.
+// Interpolates between two models with a weight from a texture.
 
 #include <algorithm>
 

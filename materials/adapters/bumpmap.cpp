@@ -1,4 +1,4 @@
-// Turns the shading normal as if the surface were displaced along it by a texture.
+// Bump mapping: uses the shading normal that the surface would have if a texture displaced it along its normal.
 
 #include <Eigen/Geometry>
 
@@ -8,8 +8,8 @@
 namespace lobe {
 namespace {
 
-/// Half the step of the differences, in texture coordinates: within a texel of all but the largest textures, and far
-/// above the rounding of coordinates of a few units.
+/// Half the step of the finite differences, in texture coordinates: smaller than a texel of all but the largest
+/// textures, and far larger than the rounding error of coordinates of a few units.
 constexpr float kHalfStep = 0x1p-13f;
 
 class BumpMap final : public NormalMapping {
@@ -19,20 +19,20 @@ class BumpMap final : public NormalMapping {
 
  private:
   std::optional<Tilted> tilted(const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const override {
-    // The displaced position is p + h(u,v) z; its derivatives, curvature of the base left out, span the new tangent
-    // plane.
+    // The displaced position is p + h(u,v) z. Its derivatives, without the curvature of the base surface, span the new
+    // tangent plane.
     const Vec3 du(dpdu.x(), dpdu.y(), derivative(uv, Vec2(kHalfStep, 0.0f)));
     const Vec3 dv(dpdv.x(), dpdv.y(), derivative(uv, Vec2(0.0f, kHalfStep)));
-    // In double precision: the lengths are those of any scene, to the fourth power.
+    // In double precision, because the squared norm has the fourth power of lengths at the scale of the scene.
     const Eigen::Vector3d cross = du.cast<double>().cross(dv.cast<double>());
     const double length = cross.norm();
     if (!(length > 0.0) || cross.z() == 0.0) return std::nullopt;
     const Vec3 normal =
-        (cross / (cross.z() > 0.0 ? length : -length)).cast<float>();  // mirrored coordinates turn it over
+        (cross / (cross.z() > 0.0 ? length : -length)).cast<float>();  // mirrored texture coordinates flip it
     return Tilted{normal, du, dv};
   }
 
-  /// By central differences of the displacement's luminance, over the step as it came out in floating point.
+  /// Central difference of the displacement, divided by the step as rounded in floating point.
   float derivative(const Vec2& uv, const Vec2& halfStep) const {
     const Vec2 ahead = uv + halfStep;
     const Vec2 behind = uv - halfStep;

@@ -8,7 +8,8 @@
 namespace lobe {
 namespace {
 
-/// Snell's law, eta being far over near side; the side of w is kept. nullopt: total reflection, or along the surface.
+/// Refracts w by Snell's law, with eta the index of the far side over that of the near side; the result stays on the
+/// side of w. nullopt: total internal reflection, or w is in the surface plane.
 std::optional<Vec3> bent(const Vec3& w, double eta) {
   const DielectricFresnel fresnel = fresnelDielectric(std::abs(w.z()), eta);
   if (!(fresnel.cosTransmitted > 0.0) || w.z() == 0.0f) return std::nullopt;
@@ -44,7 +45,7 @@ Rgb CoatedBase::absorption(const Vec3& oInside, const Vec3& iInside, const Vec2&
   return (-depth_->eval(uv) * (1.0f / std::abs(oInside.z()) + 1.0f / std::abs(iInside.z()))).exp();
 }
 
-// The layer spreads a solid angle, seen from outside, by 1/η² cosθ/cosθ' (inside over outside).
+// Refraction scales solid angles by dω'/dω = cosθ / (η² cosθ'), where the primed quantities are inside the layer.
 Rgb CoatedBase::eval(const Vec3& wo, const Vec3& wi, const Vec2& uv) const {
   const std::optional<Vec3> o = bentInwards(wo);
   const std::optional<Vec3> i = bentInwards(wi);
@@ -77,7 +78,7 @@ std::optional<DeltaSample> CoatedBase::sampleDelta(const Vec3& wo, const Vec2& u
   return DeltaSample{*wi, inside->weight * absorption(*o, inside->wi, uv), inside->eta};
 }
 
-// How often the nested sampler takes its delta part is about the share of that in the albedo.
+// The probability of the nested sampler's delta part approximates the fraction of the delta part in the albedo.
 CoatedBase::Albedo CoatedBase::nestedAlbedo(const Vec3& inside, const Vec2& uv) const {
   const Rgb all = nested_->albedo(inside, uv);
   const float bright = luminance(all);

@@ -1,5 +1,5 @@
 #pragma once
-// Internal to materials/: what lies under a dielectric coating, as it is seen from outside.
+// Internal to materials/: a model under a dielectric coating, as seen from outside.
 
 #include <array>
 
@@ -9,28 +9,29 @@
 namespace lobe {
 
 /// A model seen through an absorbing layer with a flat dielectric interface on top (Weidlich and Wilkie 2007,
-/// "Arbitrarily Layered Micro-Facet Surfaces"): directions are bent at the interface. Light that the interface throws
-/// back from within is lost. How much the interface lets through is left to the owner, who multiplies with it for both
-/// directions. Directions are outside; either side of the surface is coated.
+/// "Arbitrarily Layered Micro-Facet Surfaces"): directions are refracted at the interface. Light that the interface
+/// reflects internally is lost. The owner multiplies by the transmittance of the interface for both directions. All
+/// directions are outside the layer; both sides of the surface are coated.
 class CoatedBase {
  public:
-  /// eta: index of the layer over that outside. depth: absorption coefficient times thickness.
+  /// eta: index of the layer over that of the outside. depth: absorption coefficient times thickness.
   CoatedBase(BsdfPtr nested, double eta, TexturePtr depth);
 
   Rgb eval(const Vec3& wo, const Vec3& wi, const Vec2& uv) const;
-  /// The nested model's sample where it gets out of the layer, with its value and density from eval and pdf.
+  /// The nested model's sample, refracted out of the layer, with value and density as from eval and pdf. nullopt also
+  /// for total internal reflection.
   std::optional<BsdfSample> sample(const Vec3& wo, const Vec2& uv, float choice, const Vec2& u) const;
   float pdf(const Vec3& wo, const Vec3& wi, const Vec2& uv) const;
   std::optional<DeltaSample> sampleDelta(const Vec3& wo, const Vec2& uv, float choice) const;
 
-  /// The directional albedo by parts, approximately.
+  /// Approximate directional albedo, split by the parts of the nested model.
   struct Albedo {
-    Rgb constant = Rgb::Zero();     ///< of what is diffuse reflection inside
-    Rgb directional = Rgb::Zero();  ///< of other smooth parts, taken as narrow
+    Rgb constant = Rgb::Zero();     ///< of the nested model's diffuse reflection
+    Rgb directional = Rgb::Zero();  ///< of its other smooth parts, treated as narrow lobes
     Rgb delta = Rgb::Zero();
     Rgb sum() const { return constant + directional + delta; }
   };
-  /// transmittance(|cosθ|): of the interface, from outside. Included for both directions.
+  /// transmittance(|cosθ|) of the interface from outside is included for both directions.
   template <typename Transmittance>
   Albedo albedo(const Vec3& wo, const Vec2& uv, const Transmittance& transmittance) const {
     const std::optional<Vec3> inside = bentInwards(wo);
@@ -50,7 +51,7 @@ class CoatedBase {
   const Bsdf& nested() const { return *nested_; }
 
  private:
-  /// Cosines outside and inside of light that leaves the layer, one of a number of equal shares of diffuse light.
+  /// Cosines, outside and inside the layer, of one of several equally weighted rays of diffuse light that leaves it.
   struct DiffuseRay {
     float outside, inside;
   };
@@ -67,8 +68,7 @@ class CoatedBase {
   std::array<DiffuseRay, 16> diffuseRays_;
 };
 
-/// What smooth and rough coatings share of the nested model: the sides, and the mapped normals, which the coating
-/// follows.
+/// Common base of smooth and rough coatings: transmission and mapped normals are those of the nested model.
 class CoatedBsdf : public Bsdf {
  public:
   explicit CoatedBsdf(CoatedBase base) : base_(std::move(base)) {}

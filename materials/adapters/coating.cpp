@@ -1,5 +1,5 @@
-// A smooth dielectric coating, with absorption, over another model. Light that the coating throws back from within is
-// lost, as in Mitsuba 0.6.
+// A smooth, absorbing dielectric coating over another model. Light that the coating reflects internally is lost, as in
+// Mitsuba 0.6.
 
 #include "materials/adapters/coated_base.h"
 #include "materials/adapters/coating_parameters.h"
@@ -48,7 +48,7 @@ class Coating final : public CoatedBsdf {
     return delta > 0.0f ? delta / (smooth + delta) : 0.0f;
   }
 
-  /// The nested model's lobes look otherwise from outside: they are left to its sampler.
+  /// Refraction changes the nested model's lobes, so they are not described here but left to its sampler.
   LobeMixture mixture(const Vec3& wo, const Vec2& uv) const override {
     const CoatedBase::Albedo nested = nestedAlbedo(wo, uv);
     LobeMixture result;

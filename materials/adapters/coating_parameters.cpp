@@ -15,7 +15,7 @@ CoatingParameters readCoating(const Parameters& parameters) {
     throw ParameterError("thickness", fmt::format("thickness must be finite and not negative, not {}", thickness));
   BsdfPtr nested = parameters.onlyChild();
   if (nested->mapsNormals())
-    parameters.warn("", "the coating follows the mapped normals of what it coats, whose own surface would be smooth");
+    parameters.warn("", "the mapped normals of the nested bsdf also apply to the coating, which should be smooth");
   return {std::move(nested), readRelativeIor(parameters, "bk7"),
           scaledTexture(parameters.texture("sigma_a", grey(0.0f)), grey(static_cast<float>(thickness))),
           readReflectance(parameters, {"specular_reflectance", grey(1.0f)})};

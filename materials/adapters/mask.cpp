@@ -1,4 +1,4 @@
-// Lets part of the light pass straight through, as if there were holes too small to see.
+// A model with an opacity; the rest of the light passes straight through the surface.
 
 #include "materials/models.h"
 #include "materials/reflectance.h"

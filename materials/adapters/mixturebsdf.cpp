@@ -1,4 +1,4 @@
-// A weighted sum of several models, the same everywhere on the surface.
+// A weighted sum of models, with weights that are constant over the surface.
 
 #include <algorithm>
 #include <charconv>
@@ -26,7 +26,7 @@ class Mixture final : public WeightedBsdf {
   throw ParameterError("weights", message);
 }
 
-/// Numbers between commas, semicolons or blanks.
+/// Numbers separated by commas, semicolons or white space.
 std::vector<double> parseWeights(const std::string& text) {
   constexpr std::string_view kSeparators = " \t\r\n,;";
   std::vector<double> numbers;
@@ -34,7 +34,7 @@ std::vector<double> parseWeights(const std::string& text) {
     const std::size_t end = std::min(text.find_first_of(kSeparators, at), text.size());
     const std::optional<double> number = parseReal(std::string_view(text).substr(at, end - at));
     if (!number || !(*number >= 0.0 && *number <= 1e6))
-      refuse(fmt::format("\"{}\" in weights is not a number of at least 0", text.substr(at, end - at)));
+      refuse(fmt::format("weights contains \"{}\", which is not a number in [0, 1e6]", text.substr(at, end - at)));
     numbers.push_back(*number);
     at = text.find_first_not_of(kSeparators, end);
   }
@@ -49,10 +49,11 @@ PartWeights readWeights(const Parameters& parameters, std::size_t parts) {
   double total = 0.0;
   for (const double number : numbers) total += number;
   if (!(total > 0.0)) refuse("the sum of weights must be positive");
-  // As Mitsuba 0.6: what may add energy is scaled down, unless the file insists, as the parts may be dark enough.
+  // As in Mitsuba 0.6, weights that sum to more than 1 are scaled down, because they may create energy. The file can
+  // disable this for parts that are dark enough.
   const bool scales = parameters.flag("ensure_energy_conservation", true) && total > 1.0;
   if (scales)
-    parameters.warn("weights", fmt::format("the sum of weights is {:.4g}: they are scaled by {:.4g} to a sum of 1 "
+    parameters.warn("weights", fmt::format("the sum of weights is {:.4g}; they are scaled by {:.4g} to a sum of 1 "
                                            "(ensureEnergyConservation)",
                                            total, 1.0 / total));
   PartWeights weights{};

@@ -1,5 +1,5 @@
 #pragma once
-// Internal to materials/: a model that reflects as another does, and only turns the shading normal.
+// Internal to materials/: a model that reflects like its nested model, with a different shading normal.
 
 #include "materials/bsdf.h"
 #include "materials/parameters.h"
@@ -8,13 +8,13 @@ namespace lobe {
 
 class NormalMapping : public Bsdf {
  public:
-  /// What Mitsuba 3.7 does by default, and older versions do not.
+  /// Corrections that Mitsuba 3.7 makes by default and older versions do not make.
   struct Options {
-    /// Turns a normal that looks away from the viewer half around the unmapped one, so that it faces the viewer.
+    /// Rotates a mapped normal that faces away from the viewer by 180° about the unmapped normal.
     bool flipInvalid = false;
     bool shadowTerminator = false;
   };
-  /// From flip_invalid_normals and use_shadowing_function, off by default.
+  /// Reads flip_invalid_normals and use_shadowing_function, which are off by default.
   static Options readOptions(const Parameters& parameters);
 
   NormalMapping(BsdfPtr nested, const Options& options) : nested_(std::move(nested)), options_(options) {}
@@ -38,22 +38,23 @@ class NormalMapping : public Bsdf {
   bool shadowsTerminator() const final { return options_.shadowTerminator || nested_->shadowsTerminator(); }
 
  protected:
-  /// The mapped surface: its unit normal with z > 0, and the derivatives of position along it.
+  /// The mapped surface: its unit normal, with z > 0, and the derivatives of position with respect to u and v.
   struct Tilted {
     Vec3 normal, dpdu, dpdv;
   };
 
  private:
-  /// nullopt: the map does not say, and the surface stays as it is.
+  /// nullopt: the map has no valid normal here, and the surface is unchanged.
   virtual std::optional<Tilted> tilted(const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const = 0;
 
   BsdfPtr nested_;
   Options options_;
 };
 
-/// For the terminator of a mapped normal, whose cosine to the unmapped one is given: the squared GGX roughness of the
-/// facets that stand for the relief, of which Smith's term shadows the unmapped surface (Conty Estevez, Lecocq and
-/// Stein 2019, "A Microfacet-Based Shadowing Function to Solve the Bump Terminator Problem").
+/// The squared GGX roughness of the microfacets that approximate the relief of a bump or normal map, given the cosine
+/// between the mapped and the unmapped normal. Smith's shadowing term for this roughness, with respect to the unmapped
+/// normal, removes the hard terminator (Conty Estevez, Lecocq and Stein 2019, "A Microfacet-Based Shadowing Function to
+/// Solve the Bump Terminator Problem").
 float terminatorRoughness2(float cosine);
 
 }  // namespace lobe

@@ -1,4 +1,5 @@
-// Takes the shading normal from a texture: 2·rgb − 1 in the frame of the base normal z and the tangent along u.
+// Normal mapping: the shading normal is 2·rgb − 1 of a texture, in the frame of the base normal (z) and the tangent
+// along u.
 
 #include "materials/adapters/normal_mapping.h"
 #include "materials/models.h"
@@ -16,7 +17,7 @@ class NormalMap final : public NormalMapping {
   std::optional<Tilted> tilted(const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const override {
     const Vec3 mapped = (2.0f * normals_->eval(uv) - 1.0f).matrix();
     const float length = mapped.norm();
-    // A normal that looks below the surface, or nowhere, is a fault of the image: the base normal stands in.
+    // Normals that point below the surface or have length zero are invalid; the base normal replaces them.
     if (!(length > 0.0f && mapped.z() > 0.0f)) return std::nullopt;
     return Tilted{Frame::fromTangent(Vec3::UnitZ(), dpdu).toWorld(mapped / length), dpdu, dpdv};
   }

@@ -1,5 +1,5 @@
-// A rough dielectric coating, with absorption, over another model, as in Mitsuba 0.6: the coating reflects by its
-// facets, but bends light on its way in and out as if it were smooth.
+// A rough, absorbing dielectric coating over another model, as in Mitsuba 0.6: the coating reflects as a microfacet
+// surface, but refracts light on its way in and out as if it were smooth.
 
 #include "materials/adapters/coated_base.h"
 #include "materials/adapters/coating_parameters.h"
@@ -11,7 +11,7 @@
 namespace lobe {
 namespace {
 
-/// w in the frame in which wo is above the surface; and back.
+/// Maps w to the frame in which wo is above the surface; its own inverse.
 Vec3 upright(const Vec3& w, const Vec3& wo) {
   return wo.z() > 0.0f ? w : Vec3(w.x(), w.y(), -w.z());
 }
@@ -72,7 +72,7 @@ class RoughCoating final : public CoatedBsdf {
 
   std::span<const LobePtr> lobes() const override { return lobes_; }
 
-  /// The nested model's lobes look otherwise from outside: they are left to its sampler.
+  /// Refraction changes the nested model's lobes, so they are not described here but left to its sampler.
   LobeMixture mixture(const Vec3& wo, const Vec2& uv) const override {
     LobeMixture result;
     if (wo.z() == 0.0f) return result;
@@ -92,7 +92,7 @@ class RoughCoating final : public CoatedBsdf {
   }
 
  private:
-  /// Albedos of the coating's own reflection and of what it coats.
+  /// Albedos of the coating's own reflection and of the nested model.
   struct Parts {
     Rgb glossy;
     CoatedBase::Albedo nested;
@@ -100,7 +100,7 @@ class RoughCoating final : public CoatedBsdf {
     float glossyProbability() const { return luminance(glossy) > 0.0f ? luminance(glossy) / smooth() : 0.0f; }
   };
 
-  /// Light lost between facets counts as reflected.
+  /// Energy that single scattering loses between facets counts as reflected.
   Parts partsAt(const LocalRoughness& roughness, const Vec3& wo, const Vec2& uv) const {
     return {(1.0f - passing(roughness, wo)) * specular_->eval(uv),
             base().albedo(wo, uv, [&](float cosine) { return transmittance_(roughness, cosine); })};
@@ -118,7 +118,7 @@ class RoughCoating final : public CoatedBsdf {
   Roughness roughness_;
   double eta_;
   VaryingTransmittance transmittance_;
-  std::vector<LobePtr> lobes_;  ///< one for each level
+  std::vector<LobePtr> lobes_;  ///< one for each roughness level
   TexturePtr specular_;
 };
 
@@ -126,7 +126,8 @@ class RoughCoating final : public CoatedBsdf {
 
 BsdfPtr makeRoughCoating(const Parameters& parameters) {
   Roughness roughness = Roughness::read(parameters);
-  if (!roughness.isotropic()) throw ParameterError("alpha_u", "roughcoating is isotropic: give alpha");
+  if (!roughness.isotropic())
+    throw ParameterError("alpha_u", "roughcoating must be isotropic: give alpha instead of alpha_u and alpha_v");
   return std::make_shared<RoughCoating>(std::move(roughness), readCoating(parameters));
 }
 

@@ -1,4 +1,4 @@
-// Gives a one-sided model to both sides of a surface, or a model to each side.
+// Applies a one-sided model to both sides of a surface, or one model to each side.
 
 #include "materials/models.h"
 
@@ -57,7 +57,7 @@ class TwoSided final : public Bsdf {
     return wo.z() > 0.0f ? front_->albedo(wo, uv) : back_->albedo(flipped(wo), uv);
   }
 
-  /// On the back the map is that of the mirrored surface, whose relief comes towards the viewer as it does in front.
+  /// On the back, the map is that of the mirrored surface, so that bumps protrude towards the viewer as on the front.
   Vec3 perturbedNormal(const Vec3& wo, const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const override {
     if (wo.z() > 0.0f) return front_->perturbedNormal(wo, uv, dpdu, dpdv);
     const Vec3 mirrored = back_->perturbedNormal(flipped(wo), uv, flipped(dpdu), flipped(dpdv));
@@ -81,8 +81,8 @@ BsdfPtr makeTwoSided(const Parameters& parameters) {
     throw ParameterError("", "twosided needs one nested bsdf, or two for front and back");
   for (const BsdfPtr& child : children)
     if (child->transmits())
-      throw ParameterError("",
-                           "twosided cannot hold a bsdf that transmits light; a mask goes around it: mask > twosided");
+      throw ParameterError(
+          "", "twosided cannot contain a bsdf that transmits light; put a mask around it: mask > twosided");
   return std::make_shared<TwoSided>(children.front(), children.back());
 }
 

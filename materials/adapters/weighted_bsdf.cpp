@@ -15,10 +15,10 @@ float sum(const PartWeights& weights) {
 struct Pick {
   std::size_t part;
   float fraction;  ///< probability of this part
-  float choice;    ///< uniform in [0,1) again
+  float choice;    ///< rescaled to be uniform in [0,1)
 };
 
-/// A part with probability proportional to its weight; nullopt: there is none.
+/// Chooses a part with probability proportional to its weight. nullopt: all weights are zero.
 std::optional<Pick> pick(const PartWeights& weights, float choice) {
   const float total = sum(weights);
   std::optional<Pick> last;
@@ -33,7 +33,7 @@ std::optional<Pick> pick(const PartWeights& weights, float choice) {
   return last;
 }
 
-/// Leaves the tints that fit into a mixture, the largest.
+/// Keeps the kMaxLobes largest tints.
 void keepLargest(std::vector<LobeTint>& tints) {
   constexpr auto kKept = static_cast<std::size_t>(kMaxLobes);
   if (tints.size() <= kKept) return;
@@ -123,7 +123,7 @@ LobeMixture WeightedBsdf::mixture(const Vec3& wo, const Vec2& uv) const {
       tints.push_back({firstLobe_[i] + glossy.lobe, all[i] * glossy.tint});
     }
     result.constant += all[i] * part.constant;
-    // How often the sampler takes the delta part is about its share of the albedo.
+    // The sampler's delta probability approximates the fraction of the delta part in the albedo.
     const float albedo = all[i] * luminance(parts_[i]->albedo(wo, uv)) * (1.0f - parts_[i]->deltaProbability(wo, uv));
     albedos += albedo;
     result.undescribedFraction += albedo * part.undescribedFraction;

@@ -1,5 +1,5 @@
 #pragma once
-// Internal to materials/: a weighted sum of reflectance models, as blends and mixtures are.
+// Internal to materials/: a weighted sum of reflectance models, the base of blendbsdf and mixturebsdf.
 
 #include <array>
 
@@ -7,17 +7,17 @@
 
 namespace lobe {
 
-/// Most models that take part in one sum.
+/// Maximum number of models in one sum.
 inline constexpr std::size_t kMaxParts = 8;
-/// One number for each part; zero beyond the last.
+/// One weight per part; zero beyond the last part.
 using PartWeights = std::array<float, kMaxParts>;
 
-/// Σ weight_i part_i, smooth parts with smooth parts and delta with delta. The sampler takes part i with a probability
-/// proportional to its weight, and in it the smooth or delta part as that itself would. lobes() are those of all parts,
-/// one after another; of more than kMaxLobes that take part at a point, mixture() keeps those of the largest tint.
+/// Σ weight_i part_i, separately for smooth and delta parts. The sampler chooses part i with probability proportional
+/// to its weight, and within it the smooth or delta part as the part's own sampler would. lobes() concatenates those of
+/// all parts; if more than kMaxLobes contribute at a point, mixture() keeps those with the largest tints.
 ///
-/// All parts share one frame, so that normals mapped in the parts are averaged by weight: exact where only one part
-/// counts, or where all parts agree.
+/// All parts share one shading frame, so the normals mapped by the parts are averaged by weight. This is exact where
+/// only one part has a weight, or where all parts agree.
 class WeightedBsdf : public Bsdf {
  public:
   /// 1 to kMaxParts parts.
@@ -37,11 +37,10 @@ class WeightedBsdf : public Bsdf {
   bool shadowsTerminator() const final;
 
  private:
-  /// At least 0 each, with a sum above 0. A sum above 1 is for dark parts: the whole may then reflect no more than it
-  /// receives all the same.
+  /// Each at least 0, with a positive sum. If the sum exceeds 1, energy is conserved only if the parts are dark enough.
   virtual PartWeights weights(const Vec2& uv) const = 0;
 
-  /// Weights of the parts' smooth parts and of their delta parts, as the sampler chooses.
+  /// The sampler's weights of the smooth and of the delta parts of all parts.
   struct Split {
     PartWeights smooth{};
     PartWeights delta{};
@@ -50,7 +49,7 @@ class WeightedBsdf : public Bsdf {
   float mixedPdf(const PartWeights& smooth, const Vec3& wo, const Vec3& wi, const Vec2& uv) const;
 
   std::vector<BsdfPtr> parts_;
-  std::vector<int> firstLobe_;  // of each part, in lobes_
+  std::vector<int> firstLobe_;  // index of each part's first lobe in lobes_
   std::vector<LobePtr> lobes_;
 };
 

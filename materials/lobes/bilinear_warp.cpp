@@ -19,18 +19,18 @@ AxisPlace placeOn(const std::vector<float>& nodes, double x) {
   return {index, std::clamp((x - low) / (nodes[index + 1] - low), 0.0, 1.0)};
 }
 
-/// ∫ of a line from a to b up to t, in [0,1].
+/// Integral over [0,t] of the line from a at 0 to b at 1.
 double lineIntegral(double a, double b, double t) {
   return t * (a + 0.5 * t * (b - a));
 }
 
-/// The t at which lineIntegral is mass.
+/// The t in [0,1] at which lineIntegral equals mass.
 double lineInverse(double a, double b, double mass) {
   const double root = a + std::sqrt(std::max(0.0, a * a + 2.0 * mass * (b - a)));
   return root > 0.0 ? std::clamp(2.0 * mass / root, 0.0, 1.0) : 0.0;
 }
 
-/// The last of the cells 0 to cells − 1 whose beginning, integral(cell), is not above mass.
+/// The last of the cells 0 to cells − 1 whose cumulative integral at its start, integral(cell), does not exceed mass.
 template <typename Integral>
 std::size_t cellOf(std::size_t cells, double mass, Integral&& integral) {
   std::size_t low = 0;

@@ -1,9 +1,9 @@
 #pragma once
-// Tables over the unit square that are bilinear between their nodes, one for each node of two parameters between which
-// they are interpolated linearly: plain tables, and densities with their samplers (Dupuy and Jakob 2018, "An Adaptive
-// Parameterization for Efficient Material Acquisition and Rendering", section 4 and supplement).
+// Bilinear tables over the unit square, one for each node of two parameters, between which they are interpolated
+// linearly: tables of values, and densities with samplers (Dupuy and Jakob 2018, "An Adaptive Parameterization for
+// Efficient Material Acquisition and Rendering", section 4 and supplement).
 //
-// The nodes of a table cover the square including its border; x runs fastest.
+// The nodes of a table include the border of the square; x varies fastest.
 
 #include <array>
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace lobe {
 
-/// The tables that surround a pair of parameters, with weights of sum 1; unused ones have weight 0.
+/// The tables to interpolate for a pair of parameters, with weights that sum to 1; unused entries have weight 0.
 struct TableBlend {
   std::array<std::size_t, 4> table{};
   std::array<double, 4> weight{};
@@ -30,7 +30,7 @@ struct TableBlend {
   }
 };
 
-/// The nodes of both parameters, ascending; tables are numbered with the second one running fastest.
+/// The nodes of both parameters, ascending. In the order of tables the second parameter varies fastest.
 class ParameterNodes {
  public:
   ParameterNodes(std::vector<float> first, std::vector<float> second)
@@ -40,7 +40,7 @@ class ParameterNodes {
   const std::vector<float>& first() const { return first_; }
   const std::vector<float>& second() const { return second_; }
 
-  /// Parameters beyond the nodes are clamped.
+  /// Parameters outside the range of the nodes are clamped.
   TableBlend at(double first, double second) const;
 
  private:
@@ -54,14 +54,14 @@ struct TableSize {
   std::size_t nodes() const { return width * height; }
 };
 
-/// A cell of a table and the place within it.
+/// A cell of a table and a position within it.
 struct TableCell {
   TableCell(const TableSize& size, const Eigen::Vector2d& point);
 
-  std::size_t x, y;     ///< of the lower corner
-  Eigen::Array2d rest;  ///< in [0,1]²
+  std::size_t x, y;     ///< node of the lower corner
+  Eigen::Array2d rest;  ///< position within the cell, in [0,1]²
 
-  /// node(x, y) interpolated.
+  /// Interpolates node(x, y) bilinearly.
   template <typename Node>
   auto interpolate(Node&& node) const {
     const double right = rest.x(), upper = rest.y();
@@ -75,21 +75,22 @@ struct TableCell {
 
 struct WarpPoint {
   Eigen::Vector2d point;
-  double density;  ///< of the warp's image, over the square
+  double density;  ///< of the warped uniform distribution at the point, over the square
 };
 
-/// Densities over the square. Samples first y by its marginal, then x.
+/// Densities over the square. Sampling inverts the marginal distribution of y, then the conditional one of x.
 class BilinearWarp {
  public:
-  /// Values of one or more tables, not negative; each is normalised. A table of nothing but zeros is uniform.
+  /// Non-negative values of one or more tables, each of which is normalised. A table of zeros becomes uniform.
   BilinearWarp(const TableSize& size, std::vector<float> values);
 
   double density(const Eigen::Vector2d& point, const TableBlend& blend) const;
 
-  /// From u in the square, uniform, to a point of that density, and that density.
+  /// Maps a uniform u in the square to a point with this density, and returns the density there.
   WarpPoint sample(const Eigen::Vector2d& u, const TableBlend& blend) const;
 
-  /// The u of which sample makes the point, and the density at the point. Where the density is zero, any such u.
+  /// The inverse of sample(): the u that it maps to the point, and the density at the point. Where the density is zero,
+  /// u is not unique.
   WarpPoint invert(const Eigen::Vector2d& point, const TableBlend& blend) const;
 
  private:

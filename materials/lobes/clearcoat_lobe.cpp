@@ -17,7 +17,7 @@ Vec3d unit(const Vec3& w) {
   return w.cast<double>().normalized();
 }
 
-/// Smith's G1 of GGX of α = 0.25, for a cosine in (0,1].
+/// Smith's G1 for GGX with α = 0.25, for a cosine in (0,1].
 double shadowing(double cosine) {
   constexpr double kAlpha2 = 0.0625;
   return 2.0 * cosine / (cosine + std::sqrt(cosine * cosine + kAlpha2 * (1.0 - cosine * cosine)));
@@ -66,7 +66,7 @@ float ClearcoatLobe::pdf(const Vec3& wo, const Vec3& wi) const {
   if (!(wo.z() > 0.0f && wi.z() > 0.0f)) return 0.0f;
   const Vec3d o = unit(wo);
   const Vec3d h = (o + unit(wi)).normalized();
-  constexpr double kSmallestCosine = 1e-6;  // keeps the density of what is never drawn finite
+  constexpr double kSmallestCosine = 1e-6;  // keeps the density finite for directions that are never sampled
   return static_cast<float>(0.25 * density(h) * h.z() / std::max(o.dot(h), kSmallestCosine));
 }
 

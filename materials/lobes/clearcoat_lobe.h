@@ -7,13 +7,13 @@
 
 namespace lobe {
 
-/// F D G, with Burley's distribution of normals GTR1 ("Physically Based Shading at Disney", 2012, equation 4),
-/// Schlick's reflectance of 0.04 and Smith's shadowing of GGX for α = 0.25. There is no division by the cosines: in
-/// Mitsuba 3, which is followed here, the shadowing does not have them either. Sampled by D cosθ.
+/// F D G with Burley's GTR1 distribution of normals ("Physically Based Shading at Disney", 2012, equation 4), Schlick's
+/// approximation with 0.04 at normal incidence, and Smith's shadowing of GGX with α = 0.25. As in Mitsuba 3, it is not
+/// divided by the cosines. Half vectors are sampled with density D cosθ.
 class ClearcoatLobe final : public Lobe {
  public:
-  /// alpha in (0,1). eta: of the material below, outside to inside; it matters below 1 only, where Schlick's formula
-  /// takes the refracted angle.
+  /// alpha is in (0,1). eta: index of the material below over that of the outside; it matters only if it is below 1, in
+  /// which case Schlick's formula uses the refracted angle.
   ClearcoatLobe(double alpha, double eta) : alpha_(alpha), eta_(eta < 1.0 ? eta : 1.0) {}
 
   LobeKind kind() const override { return LobeKind::isotropic; }

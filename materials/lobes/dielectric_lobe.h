@@ -10,7 +10,7 @@ namespace lobe {
 
 class DielectricLobe final : public MicrofacetLobe {
  public:
-  /// eta: index of the far side over that of the side the lobe is on, so below 1 from within.
+  /// eta: index of the far side over that of the side of the lobe, so below 1 inside the denser medium.
   DielectricLobe(const Microfacet& microfacet, double eta) : MicrofacetLobe(microfacet), eta_(eta) {}
 
  private:

@@ -22,7 +22,7 @@ Rgb fresnelConductor(float cosIncident, const Rgb& eta, const Rgb& k) {
   const Rgb t = eta.square() - k.square() - sin2;
   const Rgb r = (t.square() + 4.0f * eta.square() * k.square()).sqrt();  // a² + b²
   const Rgb a = (0.5f * (r + t)).max(0.0f).sqrt();
-  // An interface that is none is 0/0 edge on, one of zero index seen from straight above: both tend to one.
+  // The ratio is 0/0 at grazing incidence if eta = 1 and k = 0, and at normal incidence if both are 0; its limit is 1.
   static constexpr float kTiny = 1e-20f;
   const auto ratio = [](const Rgb& sum, const Rgb& twice) {
     return ((sum - twice + kTiny) / (sum + twice + kTiny)).eval();
@@ -33,7 +33,7 @@ Rgb fresnelConductor(float cosIncident, const Rgb& eta, const Rgb& k) {
 }
 
 double fresnelDiffuse(double eta) {
-  // From the dense side the integrand has a kink at the critical angle; the two sides are related exactly.
+  // The integrand from the denser side has a kink at the critical angle, but both sides are related exactly.
   if (eta < 1.0) return 1.0 - eta * eta * (1.0 - fresnelDiffuse(1.0 / eta));
   constexpr int kIntervals = 256;  // Simpson's rule over t, μ = t²
   double sum = 0.0;

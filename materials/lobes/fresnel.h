@@ -6,9 +6,8 @@
 namespace lobe {
 
 struct DielectricFresnel {
-  double reflectance;  ///< in [0,1]; 1 under total internal reflection
-  double
-      cosTransmitted;  ///< cosine of the refracted direction to the normal of the far side, ≥ 0; 0 when there is none
+  double reflectance;     ///< in [0,1]; 1 under total internal reflection
+  double cosTransmitted;  ///< cosine of the refracted direction on the far side; 0 under total internal reflection
 };
 
 /// cosIncident in [0,1], eta > 0: index of the far side over index of the near side.

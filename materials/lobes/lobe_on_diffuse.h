@@ -1,5 +1,5 @@
 #pragma once
-// Internal to materials/: the sum of a glossy lobe and Lambert's, each with a colour, as empirical models have it.
+// Internal to materials/: the sum of a glossy and a Lambertian lobe, each with a colour, for empirical models.
 
 #include <array>
 
@@ -9,8 +9,8 @@
 
 namespace lobe {
 
-/// specular(uv) · lobe + diffuse(uv) / π, above the surface. The sampler takes each by the luminance of its colour.
-/// Whether it conserves energy is up to the lobe and the colours.
+/// specular(uv) · lobe + diffuse(uv) / π, above the surface. The sampler chooses each part in proportion to the
+/// luminance of its colour. Whether energy is conserved depends on the lobe and the colours.
 class LobeOnDiffuse final : public Bsdf {
  public:
   LobeOnDiffuse(LobePtr lobe, TexturePtr specular, TexturePtr diffuse)

@@ -14,7 +14,8 @@ namespace {
 
 constexpr double kPiD = std::numbers::pi;
 
-/// Of all samples, those drawn by the cosine: tables that are zero where the measurement is not leave nothing out then.
+/// Fraction of cosine-weighted samples. They keep the density positive where a table is zero but the measurement is
+/// not.
 constexpr double kCosineFraction = 0.1;
 
 std::optional<Directions> directionsOf(const Vec3& wo, const Vec3& wi) {
@@ -82,7 +83,7 @@ float MeasuredLobe::pdf(const Vec3& wo, const Vec3& wi) const {
 
 namespace {
 
-/// The share of light from above that goes back, by the sine of the elevation; over all azimuths.
+/// Directional albedo averaged over azimuths, tabulated over cosθ.
 class AlbedoTable {
  public:
   explicit AlbedoTable(const MeasuredLobe& lobe) {
@@ -103,7 +104,7 @@ class AlbedoTable {
 
   static Rgb estimate(const MeasuredLobe& lobe, float cosine) {
     constexpr int kSamples = 512;
-    // Steps of Roberts' R3 sequence.
+    // Increments of Roberts' low-discrepancy sequence R3.
     constexpr std::array<double, 3> kStep = {0.8191725133961645, 0.6710436067037893, 0.5497004779019703};
     const float sine = std::sqrt(1.0f - cosine * cosine);
     Rgb sum = Rgb::Zero();

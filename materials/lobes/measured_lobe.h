@@ -1,6 +1,6 @@
 #pragma once
-// Internal to materials/: what the measured models share. A measured material is one lobe with its colours in the data,
-// whose sampler draws half vectors from tables.
+// Internal to materials/: the base of the measured models. A measured material is one lobe, whose colours are part of
+// the data and whose sampler draws half vectors from tables.
 
 #include <cstdint>
 #include <filesystem>
@@ -12,31 +12,31 @@
 
 namespace lobe {
 
-// Half vectors on the unit square (Dupuy and Jakob 2018): x is √(2θ/π), y is φ/2π + 1/2.
+// Parameterisation of half vectors by the unit square (Dupuy and Jakob 2018): x is √(2θ/π), y is φ/2π + 1/2.
 
 struct Spherical {
-  double theta;  ///< from z
+  double theta;  ///< angle to the z axis
   double phi;    ///< in [−π, π]
 };
 Spherical spherical(const Eigen::Vector3d& w);
 
-/// The half vector of a point of the square whose azimuth is counted from the given one.
+/// The half vector of a point of the square; its azimuth is relative to the given one.
 Eigen::Vector3d squareToHalfVector(const Eigen::Vector2d& point, double azimuth);
 Eigen::Vector2d halfVectorToSquare(const Eigen::Vector3d& half, double azimuth);
-/// Solid angle over area of the square at the half vector: 2π² x sinθ, but not 0 at the pole.
+/// Jacobian of squareToHalfVector, solid angle over area: 2π² x sinθ, bounded from below at the pole.
 double halfVectorJacobian(const Eigen::Vector3d& half);
 
-/// Unit, in double precision; both directions are above the surface.
+/// Unit vectors in double precision; wo and wi are above the surface.
 struct Directions {
   Eigen::Vector3d wo, wi, half;
 };
 
 class MeasuredLobe : public Lobe {
  public:
-  /// contentHash: of the file.
+  /// contentHash: hash of the file.
   MeasuredLobe(std::string name, std::uint64_t contentHash) : name_(std::move(name)), contentHash_(contentHash) {}
 
-  /// ρ(wo, wi) without the cosine, in colour; finite and never negative, 0 where either is not above the surface.
+  /// ρ(wo, wi) without the cosine, in colour; finite and not negative, 0 if either direction is not above the surface.
   Rgb value(const Vec3& wo, const Vec3& wi) const;
 
   std::string key() const final;
@@ -58,10 +58,10 @@ class MeasuredLobe : public Lobe {
   std::uint64_t contentHash_;
 };
 
-/// The one-sided, opaque material of the lobe.
+/// The one-sided, opaque material that consists of the lobe.
 BsdfPtr makeMeasuredBsdf(std::shared_ptr<const MeasuredLobe> lobe);
 
-/// Reads the file that the parameter filename names. What reading throws becomes a ParameterError of that parameter.
+/// Reads the file given by the parameter filename. Errors in reading are rethrown as ParameterError of that parameter.
 BsdfPtr makeMeasuredFrom(const Parameters& parameters,
                          std::shared_ptr<const MeasuredLobe> (*read)(const std::filesystem::path& path));
 

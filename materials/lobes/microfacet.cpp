@@ -11,7 +11,7 @@ using Vec3d = Eigen::Vector3d;
 constexpr double kPiD = std::numbers::pi;
 constexpr double kSqrtPi = 1.7724538509055160273;
 
-/// Giles 2012, "Approximating the erfinv function": single precision over (−1, 1).
+/// Inverse error function over (−1, 1) in single precision (Giles 2012, "Approximating the erfinv function").
 double erfInverse(double x) {
   double w = -std::log((1.0 - x) * (1.0 + x));
   double p;
@@ -31,11 +31,11 @@ double erfInverse(double x) {
   return p * x;
 }
 
-/// Slope in the direction of view of a visible normal of unit roughness seen at elevation (sinθ, cosθ): density over
-/// x < cotθ proportional to (cosθ − x sinθ) exp(−x²). Inverts its integral
+/// Samples the slope, in the viewing direction, of a normal of unit roughness that is visible from (sinθ, cosθ). Its
+/// density is proportional to (cosθ − x sinθ) exp(−x²) for x < cotθ. Inverts the integral
 ///   P(x) = cosθ √π/2 erfc(−x) + sinθ/2 exp(−x²)
-/// by Newton steps with Halley's correction inside a bracket; the start is Jakob's fit ("An Improved Visible Normal
-/// Sampling Routine for the Beckmann Distribution", 2014).
+/// by Halley's method inside a bracket; the initial value is Jakob's fit ("An Improved Visible Normal Sampling Routine
+/// for the Beckmann Distribution", 2014).
 double sampleBeckmannSlope(double sine, double cosine, double u) {
   double low = -6.0;
   double high = 6.0 * sine < cosine ? 6.0 : cosine / sine;
@@ -57,7 +57,7 @@ double sampleBeckmannSlope(double sine, double cosine, double u) {
     if (next > low && next < high) {
       const double step = std::abs(next - x);
       x = next;
-      if (step < 5e-4) break;  // convergence is cubic: what is left is of the order of 1e-10
+      if (step < 5e-4) break;  // convergence is cubic, so the error is now of the order of 1e-10
     } else {
       x = 0.5 * (low + high);
       if (high - low < 1e-7) break;
@@ -66,9 +66,9 @@ double sampleBeckmannSlope(double sine, double cosine, double u) {
   return x;
 }
 
-/// Slopes of a visible normal of unit roughness for view in the plane y = 0.
+/// Samples the slopes of a visible normal of unit roughness, for a viewing direction in the plane y = 0.
 Eigen::Vector2d sampleBeckmannSlopes(double sine, double cosine, const Vec2& u) {
-  const double y = 2.0 * (u.y() + 0x1p-25) - 1.0;  // the middle of the cell of a 24-bit number, so never −1
+  const double y = 2.0 * (u.y() + 0x1p-25) - 1.0;  // centre of the cell of a 24-bit number, so never −1
   return {sampleBeckmannSlope(sine, cosine, u.x() + 0x1p-25), erfInverse(y)};
 }
 
@@ -80,7 +80,8 @@ Vec3d visibleBeckmann(const Vec3d& stretched, const Vec2& u) {
   return {-(c * slopes.x() - s * slopes.y()), -(s * slopes.x() + c * slopes.y()), 1.0};
 }
 
-/// Dupuy and Benyoub 2023, "Sampling Visible GGX Normals with Spherical Caps": uniform in a cap, then the half vector.
+/// Samples a direction uniformly in a spherical cap and returns the half vector, not normalised (Dupuy and Benyoub
+/// 2023, "Sampling Visible GGX Normals with Spherical Caps").
 Vec3d visibleGgx(const Vec3d& stretched, const Vec2& u) {
   const double phi = 2.0 * kPiD * u.x();
   const double z = (1.0 - u.y()) * (1.0 + stretched.z()) - stretched.z();
@@ -112,7 +113,7 @@ double Microfacet::shadowingOverCosine(const Vec3d& w) const {
   const double r = std::hypot(alphaU_ * w.x(), alphaV_ * w.y());
   const double z = w.z();
   if (kind_ == Kind::ggx) return 2.0 / (z + std::sqrt(z * z + r * r));
-  // 1/(z + zΛ) with zΛ = r exp(−a²)/(2√π) − z erfc(a)/2, a = z/r. Beyond a = 6 Λ is below 1e−17.
+  // 1/(z + zΛ) with zΛ = r exp(−a²)/(2√π) − z erfc(a)/2, a = z/r. For a > 6, Λ is below 1e−17.
   if (z >= 6.0 * r) return 1.0 / z;
   const double a = z / r;
   return 1.0 / (z + r * std::exp(-a * a) / (2.0 * kSqrtPi) - 0.5 * z * std::erfc(a));

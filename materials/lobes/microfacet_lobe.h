@@ -1,6 +1,5 @@
 #pragma once
-// Internal to materials/: the reflection of a rough interface as a lobe. Subclasses say how much the interface
-// reflects.
+// Internal to materials/: the reflection of a rough interface as a lobe. Subclasses define the Fresnel term.
 
 #include <string>
 
@@ -9,7 +8,7 @@
 
 namespace lobe {
 
-/// D G F / (4 cosθo cosθi), with F of the subclass.
+/// D G F / (4 cosθo cosθi), where the subclass defines F.
 class MicrofacetLobe : public Lobe {
  public:
   explicit MicrofacetLobe(const Microfacet& microfacet) : microfacet_(microfacet) {}
@@ -27,10 +26,10 @@ class MicrofacetLobe : public Lobe {
   const Microfacet& microfacet() const { return microfacet_; }
 
  protected:
-  virtual std::string interfaceName() const = 0;     ///< ends model()
-  virtual std::string interfaceKey() const = 0;      ///< ends key(): what F depends on
-  virtual std::string interfaceSummary() const = 0;  ///< ends summary()
-  /// F, luminance, in [0,1].
+  virtual std::string interfaceName() const = 0;     ///< suffix of model()
+  virtual std::string interfaceKey() const = 0;      ///< suffix of key(): everything F depends on
+  virtual std::string interfaceSummary() const = 0;  ///< suffix of summary()
+  /// The Fresnel term F in luminance, in [0,1].
   virtual double reflectance(double cosHalf) const = 0;
 
  private:

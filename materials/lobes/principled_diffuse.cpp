@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kCells = 32;
 
-/// By the midpoint rule in the elevation, of equal steps of sin²θ, and azimuth.
+/// Integrates by the midpoint rule, with equal steps of sin²θ and of azimuth.
 PrincipledDiffuse integrate(float cosine) {
   constexpr int kElevations = 64;
   constexpr int kAzimuths = 32;
@@ -20,7 +20,7 @@ PrincipledDiffuse integrate(float cosine) {
   for (int i = 0; i < kElevations; ++i)
     for (int k = 0; k < kAzimuths; ++k) {
       const float sine2 = (static_cast<float>(i) + 0.5f) / kElevations;
-      const float phi = kPi * (static_cast<float>(k) + 0.5f) / kAzimuths;  // the other half is its mirror image
+      const float phi = kPi * (static_cast<float>(k) + 0.5f) / kAzimuths;  // the other half is symmetric
       const float sine = std::sqrt(sine2);
       const Vec3 wi(sine * std::cos(phi), sine * std::sin(phi), std::sqrt(1.0f - sine2));
       sum.add(PrincipledDiffuse::between(wo, wi), kPi / (kElevations * kAzimuths));
@@ -50,8 +50,8 @@ float schlickWeight(float cosine) {
 PrincipledDiffuse PrincipledDiffuse::between(const Vec3& wo, const Vec3& wi) {
   const float o = schlickWeight(wo.z());
   const float i = schlickWeight(wi.z());
-  const float cosine2 = std::clamp(0.5f * (1.0f + wo.dot(wi)), 0.0f, 1.0f);  // of half the angle between them
-  // Hanrahan's and Krueger's term as Burley flattens it; kept finite where both directions graze.
+  const float cosine2 = std::clamp(0.5f * (1.0f + wo.dot(wi)), 0.0f, 1.0f);  // of half the angle between wo and wi
+  // Burley's flattened version of the term of Hanrahan and Krueger; kept finite if both directions are grazing.
   const float shape = 1.25f * (1.0f / std::max(1e-6f, wo.z() + wi.z()) - 0.5f);
   PrincipledDiffuse terms;
   terms.plain = (1.0f - 0.5f * o) * (1.0f - 0.5f * i) * kInvPi;

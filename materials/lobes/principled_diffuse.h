@@ -10,8 +10,8 @@ namespace lobe {
 /// (1 − cosine)⁵, Schlick's weight.
 float schlickWeight(float cosine);
 
-/// What roughness r and flatness make a value of: diffuse() = plain + r·retro + r²·retro2, and the flat alternative
-/// flat + r·flat1 + r²·flat2. Sheen stands alone.
+/// Terms that are combined according to roughness r and flatness: diffuse() interpolates by flatness between
+/// plain + r·retro + r²·retro2 and flat + r·flat1 + r²·flat2. Sheen is separate.
 struct PrincipledDiffuse {
   float plain = 0;
   float retro = 0;
@@ -21,10 +21,10 @@ struct PrincipledDiffuse {
   float flat2 = 0;
   float sheen = 0;
 
-  /// The terms of the value for a pair of directions above the surface, 1/π included, the cosine not.
+  /// The terms for a pair of directions above the surface, without the cosine. All but sheen include 1/π.
   static PrincipledDiffuse between(const Vec3& wo, const Vec3& wi);
 
-  /// The same times the cosine, integrated over wi; cosine is that of wo, in [0,1]. From a table.
+  /// The terms times the cosine, integrated over wi, from a table; cosine is that of wo, in [0,1].
   static PrincipledDiffuse albedo(float cosine);
 
   float diffuse(float roughness, float flatness) const;

@@ -18,7 +18,7 @@ TexturePtr readWeight(const Parameters& parameters, const std::string& name, flo
 float readRate(const Parameters& parameters, const std::string& name) {
   const double rate = parameters.number(name, 1.0);
   if (!(rate >= 0.0 && rate <= 1e6))
-    throw ParameterError(name, fmt::format("{} must be at least 0, not {}", name, rate));
+    throw ParameterError(name, fmt::format("{} must be in [0, 1e6], not {}", name, rate));
   return static_cast<float>(rate);
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// Internal to materials/: what the two principled models share in reading their parameters and in what these mean.
+// Internal to materials/: parameters that both principled models read and interpret in the same way.
 
 #include <string>
 
@@ -8,19 +8,19 @@
 
 namespace lobe {
 
-/// A texture of values in [0,1], as far as its mean tells; else ParameterError.
+/// Reads a texture of values in [0,1]. Throws ParameterError if its mean is outside this interval.
 TexturePtr readWeight(const Parameters& parameters, const std::string& name, float fallback);
 
-/// How often a part is sampled in comparison with others; default 1. ParameterError: not in [0, 1e6].
+/// Reads the relative sampling rate of a part; default 1. Throws ParameterError if it is not in [0, 1e6].
 float readRate(const Parameters& parameters, const std::string& name);
 
-/// The value of such a texture at uv, in [0,1].
+/// The value at uv of a texture read by readWeight, clamped to [0,1].
 float weightOf(const TexturePtr& texture, const Vec2& uv);
 
-/// GGX of this roughness, α being its square, drawn out along local x.
+/// A GGX distribution with α = roughness², stretched along local x according to anisotropic.
 Microfacet principledInterface(float roughness, float anisotropic);
 
-/// The colour at luminance 1; white for black.
+/// The colour scaled to luminance 1; white for black.
 Rgb principledHue(const Rgb& colour);
 
 }  // namespace lobe

@@ -11,7 +11,7 @@ namespace {
 constexpr int kCells = 32;
 
 SpecularAverages average(const Microfacet& microfacet, double eta, double cosine) {
-  constexpr int kSide = 24;  // midpoints of a grid in the square of random numbers
+  constexpr int kSide = 24;  // midpoints of a grid over the square of random numbers
   const Eigen::Vector3d wo(std::sqrt(1.0 - cosine * cosine), 0.0, cosine);
   SpecularAverages sum;
   for (int i = 0; i < kSide; ++i)

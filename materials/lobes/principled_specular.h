@@ -1,5 +1,5 @@
 #pragma once
-// Internal to materials/: what the principled model needs to know of its main specular lobe, a GGX interface.
+// Internal to materials/: the main specular lobe of the principled model, a GGX interface, and its averages.
 
 #include <string>
 #include <vector>
@@ -8,11 +8,12 @@
 
 namespace lobe {
 
-/// Schlick's reflectance from that at normal incidence. cosine: of the incident direction, in [0,1]. eta: far side over
-/// near side; below 1 the formula takes the refracted angle.
+/// Schlick's reflectance, given that at normal incidence. cosine: of the incident direction, in [0,1]. eta: index of
+/// the far side over that of the near side; if below 1, the formula uses the refracted angle.
 double schlick(double normal, double cosine, double eta);
 
-/// The interface as if it reflected everything: what is fitted, its colour being a matter of the point on the surface.
+/// The interface with a Fresnel term of 1. This lobe is fitted; the Fresnel term enters through the tint, which depends
+/// on the surface point.
 class WhiteLobe final : public MicrofacetLobe {
  public:
   using MicrofacetLobe::MicrofacetLobe;
@@ -24,15 +25,15 @@ class WhiteLobe final : public MicrofacetLobe {
   double reflectance(double) const override { return 1.0; }
 };
 
-/// Averages over the interface as seen under one direction.
+/// Averages over the interface for one viewing direction.
 struct SpecularAverages {
   float white = 0;       ///< albedo of WhiteLobe
   float schlick = 0;     ///< the same with Schlick's weight as reflectance
-  float dielectric = 0;  ///< the same with Fresnel's
-  float entered = 0;     ///< 1 − Fresnel's over visible normals: what goes through the interface, shadowing left out
+  float dielectric = 0;  ///< the same with the Fresnel reflectance
+  float entered = 0;     ///< mean transmittance 1 − F over visible normals, without shadowing
 };
 
-/// Table of averages over the cosine of the viewing direction, for an isotropic GGX interface.
+/// The averages of an isotropic GGX interface, tabulated over the cosine of the viewing direction.
 class SpecularTable {
  public:
   /// eta: index of the far side over that of the side that wo is on.

@@ -5,14 +5,14 @@ namespace {
 
 using Vec3d = Eigen::Vector3d;
 
-/// Walter's equation 20.
+/// Walter et al. 2007, equation 20.
 FacetScattering reflection(const Microfacet& microfacet, const Vec3d& o, const Vec3d& i) {
   const Vec3d half = (o + i).normalized();
   const double density = 0.25 * microfacet.density(half) * microfacet.shadowingOverCosine(o);
   return {density * microfacet.shadowingOverCosine(i), density, o.dot(half), true};
 }
 
-/// Walter's equations 16, 17 and 21.
+/// Walter et al. 2007, equations 16, 17 and 21.
 FacetScattering refraction(const Microfacet& microfacet, double eta, const Vec3d& o, const Vec3d& i) {
   const Vec3d sum = o + eta * i;
   if (!(sum.squaredNorm() > 0.0)) return {};

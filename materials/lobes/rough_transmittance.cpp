@@ -21,7 +21,7 @@ Vec3d direction(double cosine) {
   return {std::sqrt(std::max(0.0, 1.0 - cosine * cosine)), 0.0, cosine};
 }
 
-/// The share of light from wo that is refracted, eta being far over near side.
+/// The fraction of light from wo that a facet with normal m refracts; eta: index of the far side over the near side.
 double refracted(const Microfacet& microfacet, const Vec3d& wo, const Vec3d& m, double eta) {
   const double c = wo.dot(m);
   const DielectricFresnel fresnel = fresnelDielectric(c, eta);
@@ -62,9 +62,9 @@ struct GaussRule {
   }
 };
 
-/// The mean of share(microfacet, wo, m, eta) over normals m visible from wo. All is symmetric about the plane of wo, so
-/// one half of the numbers that carry the azimuth is enough: an angle for GGX, where equal steps are the best rule, the
-/// sideways slope for Beckmann.
+/// The mean of fraction(microfacet, wo, m, eta) over normals m visible from wo. By symmetry about the plane of wo, half
+/// of the range of the random number for the azimuth is enough. For GGX it is an angle, for which equal steps are
+/// optimal; for Beckmann it is the slope perpendicular to the plane.
 template <int count, typename Fraction>
 double visibleMean(const Microfacet& microfacet, double cosine, double eta, const GaussRule<count>& rule,
                    const Fraction& fraction) {
@@ -82,8 +82,8 @@ double visibleMean(const Microfacet& microfacet, double cosine, double eta, cons
   return sum;
 }
 
-/// 2 ∫ R(μ) μ dμ from within. R has a kink at the critical angle, softened by roughness: both sides are integrated
-/// apart, over the root of the distance from it.
+/// 2 ∫ R(μ) μ dμ from inside. R has a kink at the critical angle, smoothed by roughness, so both sides are integrated
+/// separately, over the square root of the distance from it.
 double diffuseFromWithin(const Microfacet& microfacet, double eta) {
   constexpr std::size_t kCosines = 12;
   const GaussRule<kCosines> rule;

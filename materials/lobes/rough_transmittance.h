@@ -1,5 +1,5 @@
 #pragma once
-// Internal to materials/: how much light a rough dielectric interface lets through, by single scattering.
+// Internal to materials/: the transmittance of a rough dielectric interface under single scattering.
 
 #include <array>
 #include <functional>
@@ -9,19 +9,19 @@
 
 namespace lobe {
 
-/// E[(1 − F) G1(w_t)] over the visible normals, w_t the refracted direction; from outside, in a table over cosθ.
+/// E[(1 − F) G1(w_t)] over the visible normals from outside, with the refracted direction w_t; tabulated over cosθ.
 class RoughTransmittance {
  public:
-  /// eta: inside over outside. The distribution is isotropic. Deterministic; takes about a millisecond.
+  /// eta: index inside over index outside. The distribution must be isotropic. Deterministic; takes about 1 ms.
   RoughTransmittance(const Microfacet& microfacet, double eta);
 
-  /// From outside at cosθ in [0,1]; linear between entries.
+  /// Transmittance from outside for cosθ in [0,1], by linear interpolation.
   float operator()(float cosine) const;
 
-  /// 2 ∫ T(μ) μ dμ: of diffuse light from outside.
+  /// 2 ∫ T(μ) μ dμ: transmittance for diffuse light from outside.
   float mean() const { return mean_; }
 
-  /// 2 ∫ R(μ) μ dμ with R = E[F G1(w_r)] from within: what diffuse light from within is thrown back.
+  /// 2 ∫ R(μ) μ dμ with R = E[F G1(w_r)] from inside: reflectance for diffuse light from inside.
   float internalReflectance() const { return internalReflectance_; }
 
  private:
@@ -31,8 +31,8 @@ class RoughTransmittance {
   float internalReflectance_;
 };
 
-/// The same for a roughness that may vary: tables at its levels, and linear between them. Where the distribution is not
-/// isotropic, that of the geometric mean of its alphas.
+/// The same for a roughness that may be textured: interpolates linearly between tables for its roughness levels. For an
+/// anisotropic distribution it uses the geometric mean of both alphas.
 class VaryingTransmittance {
  public:
   VaryingTransmittance(const Roughness& roughness, double eta);

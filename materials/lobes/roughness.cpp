@@ -17,30 +17,31 @@ Microfacet::Kind readKind(const Parameters& parameters) {
   std::string name = parameters.text("distribution", "beckmann");
   std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (name == "phong" || name == "as")
-    parameters.warn("distribution", fmt::format("distribution {} is taken for Beckmann's of the same alpha", name));
+    parameters.warn("distribution", fmt::format("distribution {} is replaced by beckmann with the same alpha", name));
   if (name == "phong" || name == "as" || name == "beckmann") return Microfacet::Kind::beckmann;
   if (name == "ggx") return Microfacet::Kind::ggx;
   throw ParameterError("distribution",
-                       fmt::format("unknown distribution \"{}\"; known are beckmann, ggx, phong, as", name));
+                       fmt::format("unknown distribution \"{}\"; known names are beckmann, ggx, phong, as", name));
 }
 
 double readAlpha(const Parameters& parameters, std::string_view name) {
   const double alpha = parameters.number(name, 0.1);
   if (!(alpha >= 0.0 && alpha <= 10.0))
     throw ParameterError(std::string(name), fmt::format("{} must be in [0, 10], not {}", name, alpha));
-  if (alpha < kSmallestAlpha) parameters.note(fmt::format("{} {} is taken for {}", name, alpha, kSmallestAlpha));
+  if (alpha < kSmallestAlpha)
+    parameters.note(fmt::format("{} {} is too small; {} is used", name, alpha, kSmallestAlpha));
   return std::max(alpha, kSmallestAlpha);
 }
 
-/// Written so that NaN becomes a number.
+/// Clamped to [kSmallestAlpha, 1]; NaN becomes kSmallestAlpha.
 double clampedAlpha(float alpha) {
   return alpha > kSmallestAlpha ? std::min<double>(alpha, 1.0) : kSmallestAlpha;
 }
 
-/// A roughness as a number, or as a texture that varies.
+/// A roughness as a number, or as a texture that is not constant.
 struct Alpha {
   double number;
-  TexturePtr texture;  ///< nullptr: the number everywhere
+  TexturePtr texture;  ///< nullptr: constant
 };
 
 Alpha readAlphaOrTexture(const Parameters& parameters, std::string_view name) {
@@ -63,7 +64,7 @@ Roughness Roughness::read(const Parameters& parameters) {
   const bool u = parameters.has("alpha_u");
   const bool v = parameters.has("alpha_v");
   if ((u || v) && parameters.has("alpha")) throw ParameterError("alpha", "give either alpha, or alpha_u and alpha_v");
-  if (u != v) parameters.note(fmt::format("there is no {}: 0.1", u ? "alpha_v" : "alpha_u"));
+  if (u != v) parameters.note(fmt::format("{} is missing; 0.1 is used", u ? "alpha_v" : "alpha_u"));
   const Alpha alphaU = readAlphaOrTexture(parameters, u || v ? "alpha_u" : "alpha");
   const Alpha alphaV = u || v ? readAlphaOrTexture(parameters, "alpha_v") : alphaU;
   if (alphaU.texture || alphaV.texture) return {kind, asTexture(alphaU), asTexture(alphaV)};

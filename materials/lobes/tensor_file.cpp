@@ -15,17 +15,17 @@
 namespace lobe {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "elements are copied as they are");
+static_assert(std::endian::native == std::endian::little, "elements are copied without conversion of their byte order");
 
 constexpr std::string_view kMagic("tensor_file\0", 12);
 constexpr std::size_t kMaxDimensions = 16;
 
-// By the type's number: 8 to 64 bits, unsigned and signed in turn, then floats of 16, 32 and 64 bits.
+// Indexed by the number of the type: integers of 8 to 64 bits, each unsigned and signed, then floats of 16 to 64 bits.
 constexpr std::array<std::size_t, 12> kElementBytes = {0, 1, 1, 2, 2, 4, 4, 8, 8, 2, 4, 8};
 
 }  // namespace
 
-/// Walks through the bytes, and fails where they end.
+/// Reads the bytes in order; fails at the end of the file.
 class TensorFile::Cursor {
  public:
   explicit Cursor(const TensorFile& file) : file_(file) {}
@@ -55,7 +55,7 @@ TensorFile::TensorFile(const std::filesystem::path& path)
   if (bytes_.size() < kMagic.size() || cursor.text(kMagic.size(), "") != kMagic) fail("not a tensor file");
   const int major = cursor.number<std::uint8_t>("its version");
   const int minor = cursor.number<std::uint8_t>("its version");
-  if (major != 1 || minor != 0) fail(fmt::format("version {}.{} is not known, but 1.0 is", major, minor));
+  if (major != 1 || minor != 0) fail(fmt::format("version {}.{} is not supported, only 1.0", major, minor));
   const auto count = cursor.number<std::uint32_t>("its number of fields");
   for (std::uint32_t i = 0; i < count; ++i) readField(cursor);
 }
@@ -67,10 +67,11 @@ void TensorFile::readField(Cursor& cursor) {
   const std::size_t dimensions = cursor.number<std::uint16_t>(what);
   if (dimensions > kMaxDimensions) fail(name, fmt::format("has {} dimensions", dimensions));
   const auto type = cursor.number<std::uint8_t>(what);
-  if (type == 0 || type >= kElementBytes.size()) fail(name, fmt::format("has elements of an unknown type, {}", type));
+  if (type == 0 || type >= kElementBytes.size()) fail(name, fmt::format("has elements of the unknown type {}", type));
   const auto offset = cursor.number<std::uint64_t>(what);
-  if (offset > bytes_.size()) fail(name, fmt::format("starts at byte {} of {}", offset, bytes_.size()));
-  // Whatever extents are multiplied, the count stays below what the file can hold.
+  if (offset > bytes_.size())
+    fail(name, fmt::format("starts at byte {}, but the file has only {} bytes", offset, bytes_.size()));
+  // Checked against the number of elements that the file can hold, so that the product of extents cannot overflow.
   const std::size_t most = (bytes_.size() - offset) / kElementBytes[type];
   Field field{static_cast<Type>(type), {}, offset, 1};
   for (std::size_t i = 0; i < dimensions; ++i) {
@@ -80,7 +81,7 @@ void TensorFile::readField(Cursor& cursor) {
     field.shape.push_back(extent);
   }
   if (field.count > most) fail(name, "is larger than the rest of the file");
-  if (!fields_.emplace(name, std::move(field)).second) fail(name, "is there twice");
+  if (!fields_.emplace(name, std::move(field)).second) fail(name, "occurs twice");
 }
 
 const TensorFile::Field& TensorFile::field(const std::string& name, Type type, std::size_t dimensions) const {
@@ -106,7 +107,7 @@ Tensor<T> TensorFile::tensor(const Field& field) const {
 Tensor<float> TensorFile::floats(const std::string& name, std::size_t dimensions) const {
   Tensor<float> result = tensor<float>(field(name, Type::float32, dimensions));
   if (!std::ranges::all_of(result.values, [](float x) { return std::isfinite(x); }))
-    fail(name, "holds numbers that are not finite");
+    fail(name, "contains numbers that are not finite");
   return result;
 }
 

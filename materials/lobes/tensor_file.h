@@ -1,13 +1,13 @@
 #pragma once
 // The tensor files of the RGL material database: named arrays of any dimension. Little endian:
 //
-//   12 bytes   "tensor_file" and a zero
+//   12 bytes   "tensor_file" and a zero byte
 //    2 bytes   version, 1 and 0
 //    uint32    number of fields, then for each of them
 //      uint16    length of the name, and the name
 //      uint16    number of dimensions
 //      uint8     type of the elements
-//      uint64    where the elements start, from the beginning of the file
+//      uint64    offset of the elements from the beginning of the file
 //      uint64    extent in each dimension, the slowest first
 
 #include <cstddef>
@@ -33,11 +33,12 @@ class TensorFile {
   explicit TensorFile(const std::filesystem::path& path);
 
   bool has(const std::string& name) const { return fields_.contains(name); }
-  /// The field, of elements of that type and of that many dimensions, none of them empty; all numbers are finite.
+  /// The field, which must have elements of this type and the given number of dimensions, must not be empty and must
+  /// contain only finite numbers.
   Tensor<float> floats(const std::string& name, std::size_t dimensions) const;
   Tensor<std::uint8_t> bytes(const std::string& name, std::size_t dimensions) const;
 
-  /// Of the whole file.
+  /// Hash of the whole file.
   std::uint64_t hash() const { return hash_; }
 
   [[noreturn]] void fail(const std::string& message) const;
@@ -49,7 +50,7 @@ class TensorFile {
     Type type;
     std::vector<std::size_t> shape;
     std::size_t offset;
-    std::size_t count;  ///< of elements
+    std::size_t count;  ///< number of elements
   };
   class Cursor;
 

@@ -30,14 +30,14 @@ class Dielectric final : public Bsdf {
     if (choice < p) return DeltaSample{Vec3(-wo.x(), -wo.y(), wo.z()), reflected / p, 1.0f};
     const float e = static_cast<float>(eta);
     const float z = static_cast<float>(std::copysign(fresnel.cosTransmitted, -wo.z()));
-    // Radiance is compressed with the solid angle on entering the denser side: L/n² is what is kept.
+    // Refraction compresses solid angles in the denser medium, so that L/n² is conserved and not L.
     return DeltaSample{Vec3(-wo.x() / e, -wo.y() / e, z), refracted / ((1.0f - p) * e * e), e};
   }
   float deltaProbability(const Vec3&, const Vec2&) const override { return 1.0f; }
 
   LobeMixture mixture(const Vec3&, const Vec2&) const override { return {}; }
 
-  /// Of energy: without the scaling of radiance by the squared index.
+  /// The albedo for flux: without the scaling of radiance by the squared index.
   Rgb albedo(const Vec3& wo, const Vec2& uv) const override {
     const double eta = wo.z() > 0.0f ? eta_ : 1.0 / eta_;
     const float r = static_cast<float>(fresnelDielectric(std::abs(wo.z()), eta).reflectance);

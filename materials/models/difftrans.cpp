@@ -1,4 +1,4 @@
-// Lambert's law on the other side: what arrives at one side leaves the other evenly, as through thin paper.
+// Lambertian transmission: light that arrives on one side leaves the other with uniform radiance, as for thin paper.
 
 #include "materials/models.h"
 #include "materials/reflectance.h"
@@ -37,7 +37,7 @@ class DiffuseTransmitter final : public Bsdf {
   bool transmits() const override { return true; }
 
  private:
-  // By signs: the product of two cosines near grazing may be 0 in floating point.
+  // Compares signs, because the product of two tiny cosines may underflow to 0.
   static bool crosses(const Vec3& wo, const Vec3& wi) {
     return (wo.z() > 0.0f && wi.z() < 0.0f) || (wo.z() < 0.0f && wi.z() > 0.0f);
   }

@@ -44,7 +44,7 @@ class Diffuse final : public Bsdf {
 }  // namespace
 
 BsdfPtr makeDiffuse(const Parameters& parameters) {
-  // The second name is that of Mitsuba 0.4 and before.
+  // Mitsuba 0.4 and earlier use the name diffuseReflectance.
   const char* name = parameters.has("diffuse_reflectance") ? "diffuse_reflectance" : "reflectance";
   return std::make_shared<Diffuse>(readReflectance(parameters, {name, grey(0.5f)}));
 }

@@ -1,7 +1,7 @@
 // Materials of the RGL database: tables adapted to the visible normals (Dupuy and Jakob 2018, "An Adaptive
-// Parameterization for Efficient Material Acquisition and Rendering"), in the files of their rgb variant.
+// Parameterization for Efficient Material Acquisition and Rendering"), in the rgb variant of its files.
 //
-// The file's ω_i, about which it is parameterised, is wo here: what the camera sees.
+// The direction ω_i that parameterises the tables of the files is wo here.
 
 #include <cmath>
 #include <numbers>
@@ -17,22 +17,23 @@ namespace {
 
 constexpr double kPiD = std::numbers::pi;
 
-/// The tables hold values times the cosine of wi, interpolated across the horizon: right before it, where nothing can
-/// be measured, the quotient would rise without bound. Below this cosine (0.6 degrees) it is divided by this. The
-/// albedo changes by less than 1 in 300, and a mixture that is fitted to the BRDF is not spent on the rim.
+/// The tables contain values times the cosine of wi and are interpolated across the horizon. Close to the horizon,
+/// where nothing can be measured, division by the cosine would be unbounded, so the divisor is at least this (0.6
+/// degrees). The albedo changes by less than 1 in 300, and mixtures fitted to the BRDF do not use Gaussians for the
+/// horizon.
 constexpr double kLeastCosine = 1e-2;
 
 struct MeasuredTables {
   ParameterNodes nodes;
   bool isotropic;
-  /// How often the measured azimuths fit into the circle: 1, or 2 or 4 for symmetric materials.
+  /// Full circle over the range of measured azimuths: 1, or 2 or 4 for symmetric materials.
   int symmetry;
   BilinearWarp visible;    ///< density of visible half vectors over their square
   BilinearWarp luminance;  ///< over the square from which visible is sampled
   TableSize colourSize;
   std::vector<Eigen::Array3f> colours;  ///< over the same square
-  /// Density of half vectors over their square, and the projected area of the microsurface over that of wo; empty where
-  /// the colours are complete without them.
+  /// Density D of half vectors over their square, and projected area σ of the microsurface over the square of wo; empty
+  /// if the colours already contain the factor D / 4σ.
   TableSize normalSize, areaSize;
   std::vector<float> normals, areas;
 };
@@ -46,11 +47,11 @@ class RglLobe final : public MeasuredLobe {
   std::string model() const override { return "measured"; }
 
  private:
-  /// A pair of directions as the tables know it.
+  /// A viewing direction in terms of the tables.
   struct View {
     TableBlend blend;
     Spherical wo;
-    double azimuth;  ///< from which the half vector's is counted
+    double azimuth;  ///< origin of the azimuth of half vectors
   };
 
   View viewOf(const Eigen::Vector3d& wo) const {
@@ -59,7 +60,7 @@ class RglLobe final : public MeasuredLobe {
     return {tables_.nodes.at(phi, at.theta), at, tables_.isotropic ? at.phi : 0.0};
   }
 
-  /// By the material's symmetry, to where wo's azimuth was measured. Its own inverse.
+  /// The signs that mirror wo, by the material's symmetry, into the range of measured azimuths.
   Eigen::Vector2d mirrors(const Eigen::Vector3d& wo) const {
     if (tables_.symmetry == 1) return {1.0, 1.0};
     const double y = wo.y() > 0.0 ? -1.0 : 1.0;
@@ -85,7 +86,7 @@ class RglLobe final : public MeasuredLobe {
     return (colour.max(0.0) * scale).cast<float>();
   }
 
-  /// D / 4σ, by which the colours are divided in files with the Jacobian in them.
+  /// D / 4σ, by which the colours of files with a Jacobian have been divided.
   double factor(const Eigen::Vector2d& half, const Spherical& wo) const {
     if (tables_.normals.empty()) return 1.0;
     const auto look = [](const std::vector<float>& values, const TableSize& size, const Eigen::Vector2d& point) {
@@ -116,7 +117,7 @@ class RglLobe final : public MeasuredLobe {
   MeasuredTables tables_;
 };
 
-/// Puts the fields of a file into tables, and refuses what does not fit together.
+/// Converts the fields of a file to tables and rejects inconsistent files.
 class TableReader {
  public:
   explicit TableReader(const TensorFile& file)
@@ -143,7 +144,7 @@ class TableReader {
     if (file_.bytes("jacobian", 1).values.front() != 0) {
       tables.normals = clamped(plane("ndf", tables.normalSize));
       tables.areas = plane("sigma", tables.areaSize);
-      if (std::ranges::min(tables.areas) <= 0.0f) file_.fail("sigma", "holds areas that are not positive");
+      if (std::ranges::min(tables.areas) <= 0.0f) file_.fail("sigma", "contains areas that are not positive");
     }
     return tables;
   }
@@ -152,15 +153,15 @@ class TableReader {
   std::vector<float> axis(const std::string& name, double longest) const {
     std::vector<float> nodes = file_.floats(name, 1).values;
     for (std::size_t i = 1; i < nodes.size(); ++i)
-      if (!(nodes[i] > nodes[i - 1])) file_.fail(name, "does not ascend");
-    if (nodes.back() - nodes.front() > longest + 1e-3) file_.fail(name, "spans more than its angle can be");
+      if (!(nodes[i] > nodes[i - 1])) file_.fail(name, "is not strictly ascending");
+    if (nodes.back() - nodes.front() > longest + 1e-3) file_.fail(name, "spans a larger range than the angle can have");
     return nodes;
   }
 
   int symmetryOf(double span) const {
     const int symmetry = static_cast<int>(std::lround(2.0 * kPiD / span));
     if (symmetry != 1 && symmetry != 2 && symmetry != 4)
-      file_.fail("phi_i", "spans neither the circle nor half nor a quarter of it");
+      file_.fail("phi_i", "spans neither a full circle nor half or a quarter of one");
     return symmetry;
   }
 
@@ -175,7 +176,7 @@ class TableReader {
   Tensor<float> perView(const std::string& name, std::size_t dimensions, TableSize& size) const {
     Tensor<float> tensor = file_.floats(name, dimensions);
     if (tensor.shape[0] != nodes_.first().size() || tensor.shape[1] != nodes_.second().size())
-      file_.fail(name, fmt::format("has {}×{} tables, but phi_i and theta_i ask for {}×{}", tensor.shape[0],
+      file_.fail(name, fmt::format("has {}×{} tables, but phi_i and theta_i require {}×{}", tensor.shape[0],
                                    tensor.shape[1], nodes_.first().size(), nodes_.second().size()));
     size = sizeOf(name, tensor.shape);
     return tensor;
@@ -198,7 +199,7 @@ class TableReader {
     return result;
   }
 
-  /// Measurement and compression leave small negative values.
+  /// Removes the small negative values that measurement and compression cause.
   static std::vector<float> clamped(std::vector<float> values) {
     for (float& value : values) value = std::max(value, 0.0f);
     return values;

@@ -19,8 +19,9 @@ namespace {
 
 constexpr double kPiD = std::numbers::pi;
 
-// Bins of the half vector's elevation, which are narrow near 0 (a bin's index goes with the root of the angle), of the
-// difference vector's elevation, and of its azimuth, of which half the circle is enough: the BRDF is reciprocal.
+// Numbers of bins: of the polar angle of the half vector, which are narrow near 0 (the index is proportional to the
+// square root of the angle), of the polar angle of the difference vector, and of its azimuth. The azimuth covers half a
+// circle, because the BRDF is reciprocal.
 constexpr std::size_t kThetaHalf = 90;
 constexpr std::size_t kThetaDifference = 90;
 constexpr std::size_t kPhiDifference = 180;
@@ -28,13 +29,13 @@ constexpr std::size_t kBins = kThetaHalf * kThetaDifference * kPhiDifference;
 
 constexpr std::array<double, 3> kScales = {1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0};
 
-/// Between the middles of two bins.
+/// A position between the centres of two bins.
 struct Between {
   std::size_t first, second;
   float rest;
 };
 
-/// place is counted in bins.
+/// place is in units of bins.
 Between clampedBetween(double place, std::size_t bins) {
   const double inside = std::clamp(place - 0.5, 0.0, static_cast<double>(bins - 1));
   const std::size_t first = std::min(static_cast<std::size_t>(inside), bins - 2);
@@ -49,7 +50,7 @@ Between cyclicBetween(double place, std::size_t bins) {
   return {first, (first + 1) % bins, static_cast<float>(inside - static_cast<double>(first))};
 }
 
-/// The BRDF: linear between the middles of the bins.
+/// The BRDF, interpolated linearly between the centres of the bins.
 class MerlTable {
  public:
   explicit MerlTable(std::vector<Eigen::Array3f> values) : values_(std::move(values)) {}
@@ -59,7 +60,7 @@ class MerlTable {
     const double sine = std::hypot(d.half.x(), d.half.y());
     const double thetaHalf = std::atan2(sine, d.half.z());
     const double thetaDifference = std::atan2(difference.norm(), (d.wi + d.wo).norm());
-    // The azimuth of the difference vector about the half vector, from the plane that holds the normal.
+    // The azimuth of the difference vector about the half vector, relative to the plane that contains the normal.
     const double cosPhi = sine > 0.0 ? d.half.x() / sine : 1.0;
     const double sinPhi = sine > 0.0 ? d.half.y() / sine : 0.0;
     const Eigen::Vector3d x(cosPhi * d.half.z(), sinPhi * d.half.z(), -sine);
@@ -85,7 +86,8 @@ class MerlTable {
   std::vector<Eigen::Array3f> values_;
 };
 
-/// The density of half vectors that mirror wo into f · cosθ, as tables for some elevations of wo.
+/// Samples half vectors so that the density of wi is proportional to f · cosθ, from tables for several elevations of
+/// wo.
 class MerlSampler {
  public:
   explicit MerlSampler(const MerlTable& table) : nodes_({0.0f}, elevations()), warp_(kSize, tabulate(table)) {}
@@ -156,7 +158,8 @@ class MerlLobe final : public MeasuredLobe {
   MerlSampler sampler_;
 };
 
-/// Negative values, which mean "not measured", become 0. std::runtime_error where a number is not finite.
+/// Converts the values of a file. Negative ones, which mean "not measured", become 0. Throws std::runtime_error if a
+/// number is not finite.
 std::vector<Eigen::Array3f> tableFrom(const std::string& path, const char* planes) {
   std::vector<Eigen::Array3f> values(kBins);
   for (std::size_t channel = 0; channel < 3; ++channel)
@@ -165,7 +168,7 @@ std::vector<Eigen::Array3f> tableFrom(const std::string& path, const char* plane
       std::memcpy(&value, planes + (channel * kBins + i) * sizeof(double), sizeof(double));
       const auto scaled = static_cast<float>(std::max(value, 0.0) * kScales[channel]);
       if (!std::isfinite(value) || !std::isfinite(scaled))
-        throw std::runtime_error(fmt::format("{}: holds numbers that are not finite", path));
+        throw std::runtime_error(fmt::format("{}: contains numbers that are not finite", path));
       values[i][static_cast<Eigen::Index>(channel)] = scaled;
     }
   return values;
@@ -175,7 +178,7 @@ std::shared_ptr<const MeasuredLobe> readMerl(const std::filesystem::path& path) 
   const std::string bytes = nameErrors(path, [&] { return readFile(path); });
   std::array<std::int32_t, 3> extents{};
   if (bytes.size() < sizeof(extents))
-    throw std::runtime_error(fmt::format("{}: not a MERL file: it has {} bytes", path.string(), bytes.size()));
+    throw std::runtime_error(fmt::format("{}: not a MERL file: it has only {} bytes", path.string(), bytes.size()));
   std::memcpy(extents.data(), bytes.data(), sizeof(extents));
   if (extents[0] != kThetaHalf || extents[1] != kThetaDifference || extents[2] != kPhiDifference)
     throw std::runtime_error(fmt::format("{}: not a MERL file: its extents are {}×{}×{}, but {}×{}×{} are needed",

@@ -1,4 +1,4 @@
-// The surface that is not there: light passes straight through.
+// An invisible surface: all light passes straight through.
 
 #include "materials/models.h"
 

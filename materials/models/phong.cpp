@@ -1,6 +1,6 @@
-// Phong's model as Lafortune and Willems modified it ("Using the Modified Phong Reflectance Model for Physically Based
-// Rendering", 1994): a power of the cosine to the mirror direction, and Lambert's law. Reciprocal, and it conserves
-// energy where its two colours do not exceed 1 in sum.
+// The modified Phong model (Lafortune and Willems 1994, "Using the Modified Phong Reflectance Model for Physically
+// Based Rendering"): a power of the cosine to the mirror direction plus a Lambertian term. It is reciprocal, and
+// conserves energy if the sum of its two colours does not exceed 1.
 
 #include <cmath>
 #include <numbers>
@@ -19,7 +19,7 @@ Vec3 mirrored(const Vec3& w) {
   return {-w.x(), -w.y(), w.z()};
 }
 
-/// (n + 2) / 2π · cosⁿα, α being the angle between wi and the mirror direction of wo.
+/// (n + 2) / 2π · cosⁿα, where α is the angle between wi and the mirror direction of wo.
 class PhongLobe final : public Lobe {
  public:
   explicit PhongLobe(double exponent) : exponent_(exponent) {}
@@ -34,7 +34,7 @@ class PhongLobe final : public Lobe {
 
   std::optional<LobeSample> sample(const Vec3& wo, const Vec2& u) const override {
     if (!(wo.z() > 0.0f)) return std::nullopt;
-    // cos α = u^(1/(n+1)); its sine by what is missing from 1, which the cosine no longer knows for large n.
+    // cos α = u^(1/(n+1)). For large n the cosine rounds to 1, so the sine is computed from its logarithm by expm1.
     const double logCosine = std::log(1.0 - static_cast<double>(u.x())) / (exponent_ + 1.0);
     const double cosine = std::exp(logCosine);
     const double sine = std::sqrt(-std::expm1(2.0 * logCosine));
@@ -51,7 +51,7 @@ class PhongLobe final : public Lobe {
   }
 
  private:
-  /// cosⁿα / 2π; 0 where either is not above the surface.
+  /// cosⁿα / 2π; 0 if either direction is not above the surface.
   double power(const Vec3& wo, const Vec3& wi) const {
     if (!(wo.z() > 0.0f && wi.z() > 0.0f)) return 0.0;
     const double cosine = mirrored(wo).cast<double>().normalized().dot(wi.cast<double>().normalized());

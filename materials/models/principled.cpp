@@ -1,6 +1,6 @@
-// Disney's principled model as Mitsuba 3 has it (Burley 2012 and 2015): a GGX interface between dielectric and metal,
-// with diffuse reflection, sheen and clear coat above it and, where spec_trans says so, refraction through it. An
-// artists' model: with bright colours it may reflect a little more than it receives.
+// Disney's principled model as in Mitsuba 3 (Burley 2012 and 2015): a GGX interface that blends between dielectric and
+// metal, plus diffuse reflection, sheen, a clear coat and, if spec_trans > 0, refraction. It does not strictly conserve
+// energy: with bright colours it may reflect slightly more than it receives.
 
 #include <algorithm>
 #include <array>
@@ -27,7 +27,7 @@ struct Textures {
       clearcoatGloss;
 };
 
-/// How often the sampler takes which part, before normalisation.
+/// Sampling probabilities of the parts, before normalisation.
 struct Rates {
   float specular, clearcoat, diffuse;
 };
@@ -44,7 +44,7 @@ Vec3d unit(const Vec3& w) {
   return w.cast<double>().normalized();
 }
 
-/// The material at one point. Directions of all functions have wo above: on the back they are mirrored beforehand.
+/// The material at one point. All functions expect wo above the surface; callers mirror directions for the back.
 class Point {
  public:
   Point(const Textures& t, const Rates& rates, double eta, const Vec2& uv, bool front)
@@ -86,7 +86,7 @@ class Point {
            static_cast<float>(r->density * r->shadowingOut * r->outside * jacobian);
   }
 
-  /// A direction of density pdf, where that is above 0.
+  /// Samples a direction with density pdf; callers must reject results for which pdf returns 0.
   std::optional<Vec3> sample(const Vec3& wo, float choice, const Vec2& u) const {
     if (choice < fractions_.diffuse) return squareToCosineHemisphere(u);
     choice -= fractions_.diffuse;
@@ -98,7 +98,7 @@ class Point {
     return sampleInterface(unit(wo), (choice - fractions_.clearcoat) / fractions_.specular, u);
   }
 
-  /// The colour of the white lobe that has these averages over it.
+  /// The tint of the white lobe, given its averages.
   Rgb tint(const SpecularAverages& averages) const {
     if (!(averages.white > 0.0f)) return Rgb::Zero();
     return colour(averages.dielectric / averages.white, averages.schlick / averages.white);
@@ -113,7 +113,7 @@ class Point {
 
  private:
   struct Refraction {
-    double density, shadowingOut, shadowingIn;  // D, and Smith's terms over their cosines
+    double density, shadowingOut, shadowingIn;  // D, and Smith's G1 over the cosines
     double outside, inside, sum;                // |wo·h|, |wi·h| and |wo·h + η wi·h|
     double reflectance;
   };
@@ -128,7 +128,7 @@ class Point {
     const double inside = -i.dot(h);
     if (!(outside > 0.0 && inside > 0.0)) return std::nullopt;
     const double sum = std::abs(outside - eta_ * inside);
-    if (!(sum > 1e-9)) return std::nullopt;  // there is no half vector of nearly opposite directions at η near 1
+    if (!(sum > 1e-9)) return std::nullopt;  // nearly opposite directions at η near 1 have no half vector
     return Refraction{interface_.density(h),
                       interface_.shadowingOverCosine(o),
                       interface_.shadowingOverCosine(-i),
@@ -138,7 +138,7 @@ class Point {
                       fresnelDielectric(outside, eta_).reflectance};
   }
 
-  /// Walter et al. 2007, equation 21; η² of its Jacobian goes into the radiance's compression.
+  /// Walter et al. 2007, equation 21; the η² of its Jacobian cancels against the scaling of radiance.
   Rgb transmitted(const Vec3& wo, const Vec3& wi) const {
     const std::optional<Refraction> r = refraction(wo, wi);
     if (!r) return Rgb::Zero();
@@ -159,7 +159,8 @@ class Point {
     return value + diffuse(PrincipledDiffuse::between(wo, wi));
   }
 
-  /// Between the dielectric's reflectance, its tinted stand-in and the metal's; on the back there is only the first.
+  /// Blends the Fresnel reflectance of the dielectric, its tinted Schlick approximation and Schlick's reflectance of
+  /// the metal; on the back only the first applies.
   Rgb colour(float dielectric, float schlickWeight) const {
     if (!front_) return grey(transmitting_ * dielectric);
     const auto normal = static_cast<float>((eta_ - 1.0) / (eta_ + 1.0));
@@ -175,7 +176,7 @@ class Point {
            sheen_ * (1.0f - metallic_) * terms.sheen * sheenColour;
   }
 
-  /// How often the interface is taken as a mirror, given its reflectance at the half vector.
+  /// The probability of sampling reflection at the interface, given its reflectance at the half vector.
   float reflectedFraction(double reflectance) const {
     const auto f = static_cast<float>(reflectance);
     return front_ ? 1.0f - transmitting_ * (1.0f - f) : f;
@@ -262,7 +263,7 @@ class Principled final : public Bsdf {
   Rgb albedo(const Vec3& wo, const Vec2& uv) const override {
     if (!sees(wo)) return Rgb::Zero();
     const Parts parts = partsAt(wo, uv);
-    // The coat's lobe is narrow, so that normal and half vector are about the same.
+    // The lobe of the coat is narrow, so the normal approximates the half vector.
     const float cosine = std::abs(wo.z());
     const float coat = parts.clearcoat * (0.04f + 0.96f * schlickWeight(cosine)) * cosine * cosine;
     return (parts.tint * parts.white + parts.diffuse + parts.transmitted + coat).min(1.0f);
@@ -285,7 +286,7 @@ class Principled final : public Bsdf {
             point.clearcoat()};
   }
 
-  /// Whether there is anything on the side of wo.
+  /// Whether the surface scatters light on the side of wo.
   bool sees(const Vec3& wo) const { return wo.z() > 0.0f || (wo.z() < 0.0f && transmits_); }
   Point at(const Vec2& uv, bool front) const { return {textures_, rates_, eta_, uv, front}; }
 
@@ -319,13 +320,15 @@ Textures readTextures(const Parameters& parameters) {
           weight("clearcoat_gloss", 0.0f)};
 }
 
-/// From eta, or from specular, which stands for it. An interface that is none could not refract.
+/// Reads the index from eta or from specular, which implies one. If the material transmits, an index of 1 becomes
+/// slightly larger, because refraction without a change of index has no half vector.
 double readEta(const Parameters& parameters, bool transmits) {
   const bool byIndex = parameters.has("eta");
   const double specular = parameters.number("specular", 0.5);
   const double given = parameters.number("eta", 1.5);
   if (byIndex && parameters.has("specular")) throw ParameterError("specular", "give either eta or specular");
-  if (!(given > 0.0 && given <= 100.0)) throw ParameterError("eta", fmt::format("eta must be positive, not {}", given));
+  if (!(given > 0.0 && given <= 100.0))
+    throw ParameterError("eta", fmt::format("eta must be positive and at most 100, not {}", given));
   if (!(specular >= 0.0 && specular <= 1.0))
     throw ParameterError("specular", fmt::format("specular must be in [0, 1], not {}", specular));
   if (byIndex) return transmits && given == 1.0 ? 1.001 : given;

@@ -1,5 +1,5 @@
-// Disney's principled model for thin surfaces as Mitsuba 3 has it (Burley 2015): diffuse reflection with sheen, diffuse
-// transmission, and a GGX interface that reflects, or lets light through without bending it. The same from both sides.
+// Disney's principled model for thin surfaces as in Mitsuba 3 (Burley 2015): diffuse reflection with sheen, diffuse
+// transmission, and a GGX interface that reflects, or transmits light without refraction. Both sides are the same.
 
 #include <algorithm>
 #include <cmath>
@@ -23,7 +23,7 @@ struct Textures {
   TexturePtr baseColour, roughness, anisotropic, specTrans, diffTrans, eta, specTint, sheen, sheenTint, flatness;
 };
 
-/// How often the sampler takes which part, before normalisation.
+/// Sampling probabilities of the parts, before normalisation.
 struct Rates {
   float reflected, transmitted, diffuseReflected, diffuseTransmitted;
   float sum() const { return reflected + transmitted + diffuseReflected + diffuseTransmitted; }
@@ -33,12 +33,12 @@ Vec3 flipped(const Vec3& w) {
   return {w.x(), w.y(), -w.z()};
 }
 
-/// Transmission is less rough than reflection, by the index (ibid., figure 15).
+/// Transmission is less rough than reflection, depending on the index (Burley 2015, figure 15).
 float transmissionRoughness(float roughness, float eta) {
   return std::clamp((0.65f * eta - 0.35f) * roughness, 0.0f, 1.0f);
 }
 
-/// The material at one point. Directions of all functions have wo above: on the back they are mirrored beforehand.
+/// The material at one point. All functions expect wo above the surface; callers mirror directions for the back.
 class Point {
  public:
   Point(const Textures& t, const Rates& rates, const Vec2& uv)
@@ -72,7 +72,7 @@ class Point {
     return fractions_.transmitted * glossy + fractions_.diffuseTransmitted * cosineHemispherePdf(flipped(wi));
   }
 
-  /// A direction of density pdf, where that is above 0.
+  /// Samples a direction with density pdf; callers must reject results for which pdf returns 0.
   std::optional<Vec3> sample(const Vec3& wo, float choice, const Vec2& u) const {
     if (choice < fractions_.reflected) return reflecting_.sampleReflection(wo, u);
     choice -= fractions_.reflected;
@@ -85,7 +85,7 @@ class Point {
     return choice - fractions_.transmitted < fractions_.diffuseReflected ? wi : flipped(wi);
   }
 
-  /// The colour of the white lobe that has these averages over it.
+  /// The tint of the white lobe, given its averages.
   Rgb tint(const SpecularAverages& averages) const {
     if (!(averages.white > 0.0f)) return Rgb::Zero();
     return specular_ * fresnel(averages.dielectric / averages.white, averages.schlick / averages.white);
@@ -96,7 +96,7 @@ class Point {
   }
 
  private:
-  /// Whether the far side of the facet that turns wo into wi is that of wi.
+  /// Whether wi is on the far side of the facet that scatters wo into wi.
   static bool facesAway(const Vec3& wo, const Vec3& wi) { return wi.dot(wo + flipped(wi)) < 0.0f; }
 
   Rgb reflected(const Vec3& wo, const Vec3& wi) const {
@@ -120,7 +120,7 @@ class Point {
     return value;
   }
 
-  /// Between the dielectric's reflectance and its tinted stand-in.
+  /// Blends the Fresnel reflectance of the dielectric and its tinted Schlick approximation.
   Rgb fresnel(float dielectric, float schlickWeight) const {
     const float normal = (eta_ - 1.0f) / (eta_ + 1.0f);
     const Rgb f0 = principledHue(base_) * (normal * normal);
@@ -207,7 +207,7 @@ class PrincipledThin final : public Bsdf {
     return {point.tint(averages), point.diffuseAlbedo(cosine), point.transmittedAlbedo(averages), averages.white};
   }
 
-  /// w in the frame in which wo is above the surface; and back.
+  /// Maps w to the frame in which wo is above the surface; its own inverse.
   static Vec3 upright(const Vec3& w, const Vec3& wo) { return wo.z() > 0.0f ? w : flipped(w); }
   Point at(const Vec2& uv) const { return {textures_, rates_, uv}; }
 
@@ -224,7 +224,7 @@ class PrincipledThin final : public Bsdf {
   bool transmits_;
 };
 
-/// From 0, all light is reflected, to 2, all is transmitted.
+/// Reads diff_trans, which ranges from 0 (all diffuse light is reflected) to 2 (all is transmitted).
 TexturePtr readDiffuseTransmission(const Parameters& parameters) {
   TexturePtr texture = parameters.texture("diff_trans", grey(0.0f));
   if (const float mean = texture->mean().maxCoeff(); !(mean <= 2.0f))
@@ -235,7 +235,7 @@ TexturePtr readDiffuseTransmission(const Parameters& parameters) {
 TexturePtr readThinEta(const Parameters& parameters) {
   TexturePtr texture = parameters.texture("eta", grey(1.5f));
   if (const float mean = luminance(texture->mean()); !(mean > 0.0f && mean <= 100.0f))
-    throw ParameterError("eta", fmt::format("eta must be positive, not {}", mean));
+    throw ParameterError("eta", fmt::format("eta must be positive and at most 100, not {}", mean));
   return texture;
 }
 

@@ -1,4 +1,4 @@
-// Rough metals: a microfacet distribution of perfect conductors.
+// Rough metals: a microfacet model with the Fresnel reflectance of conductors.
 
 #include <fmt/format.h>
 
@@ -76,7 +76,7 @@ class RoughConductor final : public Bsdf {
  private:
   Roughness roughness_;
   ComplexIor ior_;
-  std::vector<LobePtr> lobes_;  ///< one for each level
+  std::vector<LobePtr> lobes_;  ///< one for each roughness level
   TexturePtr specular_;
 };
 

@@ -68,7 +68,8 @@ class RoughDielectric final : public Bsdf {
     return result;
   }
 
-  /// Of energy: without the scaling of radiance by the squared index. What is lost between facets counts as reflected.
+  /// The albedo for flux: without the scaling of radiance by the squared index. Energy that single scattering loses
+  /// between facets counts as reflected.
   Rgb albedo(const Vec3& wo, const Vec2& uv) const override {
     const Fractions mean = meanFractions(wo, uv);
     return mean.reflected + mean.refracted;
@@ -81,14 +82,14 @@ class RoughDielectric final : public Bsdf {
   struct Side {
     Side(const Roughness& roughness, double relative) : eta(relative), transmittance(roughness, relative) {}
 
-    double eta;  ///< index of the far side over that of this one
+    double eta;  ///< index of the far side over that of this side
     VaryingTransmittance transmittance;
   };
 
-  /// What the interface does with light that meets a facet.
+  /// The fractions of light that a facet reflects and refracts, tints included.
   struct Fractions {
     Rgb reflected, refracted;
-    /// How often the sampler takes one of them: by luminance; 0 where nothing comes of either.
+    /// Sampling probability of reflection or refraction, in proportion to luminance; 0 if both are black.
     float probability(bool reflects) const {
       const float total = luminance(reflected) + luminance(refracted);
       return total > 0.0f ? luminance(reflects ? reflected : refracted) / total : 0.0f;
@@ -96,7 +97,7 @@ class RoughDielectric final : public Bsdf {
   };
 
   const Side& sideOf(const Vec3& wo) const { return sides_[wo.z() > 0.0f ? 0 : 1]; }
-  /// w in the frame in which wo is above the surface; and back.
+  /// Maps w to the frame in which wo is above the surface; its own inverse.
   static Vec3 upright(const Vec3& w, const Vec3& wo) { return wo.z() > 0.0f ? w : Vec3(w.x(), w.y(), -w.z()); }
 
   FacetScattering scattering(const Microfacet& microfacet, const Vec3& wo, const Vec3& wi) const {
@@ -122,7 +123,7 @@ class RoughDielectric final : public Bsdf {
 
   Roughness roughness_;
   std::array<Side, 2> sides_;   ///< from outside, from inside
-  std::vector<LobePtr> lobes_;  ///< one for each level, from outside; then the same from inside
+  std::vector<LobePtr> lobes_;  ///< one for each roughness level from outside, then from inside
   TexturePtr reflectance_;
   TexturePtr transmittance_;
 };
@@ -131,7 +132,7 @@ class RoughDielectric final : public Bsdf {
 
 BsdfPtr makeRoughDielectric(const Parameters& parameters) {
   const double eta = readRelativeIor(parameters, "bk7");
-  // Without a difference every normal lets light straight through: there is no half vector.
+  // With equal indices every facet transmits light straight through, and there is no half vector.
   if (std::abs(eta - 1.0) < 1e-6) throw ParameterError("int_ior", "int_ior and ext_ior must differ");
   return std::make_shared<RoughDielectric>(Roughness::read(parameters), eta,
                                            readReflectance(parameters, {"specular_reflectance", grey(1.0f)}),

@@ -1,6 +1,6 @@
 // Rough diffuse surfaces: Oren and Nayar's model of Lambertian facets ("Generalization of Lambert's Reflectance Model",
-// 1994), in full (their equations 27 to 30, light scattered twice included) or by their simplification without the
-// third term and the second scattering.
+// 1994), either in full (equations 27 to 30, with interreflection) or simplified as in the paper, without the third
+// term and interreflection.
 
 #include <algorithm>
 #include <array>
@@ -24,10 +24,10 @@ struct Angles {
   float alpha, beta;
 };
 
-/// The parts of the model that depend on roughness alone; 0 slopes of the surface give Lambert's law.
+/// The coefficients of the model, which depend only on roughness. A roughness of 0 gives Lambert's law.
 struct Coefficients {
   float constant;
-  float towards;  ///< of cos Δφ, light from the side of the viewer
+  float towards;  ///< of cos Δφ: light from the side of the viewer
   float oblique;  ///< of 1 − |cos Δφ|
   float interreflected;
 };
@@ -50,7 +50,8 @@ float tangent(const Angles& a) {
   return std::tan(std::min(a.beta, 0.9999f * kHalfPi));
 }
 
-/// Integrals over wi, cosine and 1/π included, of what the coefficients are multiplied by, over the angle of wo.
+/// Integrals over wi, including the cosine and 1/π, of the terms that the coefficients multiply, tabulated over the
+/// angle of wo.
 class AlbedoTable {
  public:
   AlbedoTable() {
@@ -77,7 +78,7 @@ class AlbedoTable {
  private:
   static constexpr int kCells = 64;
 
-  // Azimuths are integrated by hand: half the circle gives ±2 of cos Δφ, all of it 2π − 4 of 1 − |cos Δφ|.
+  // The integrals over azimuth are analytic: ±2 for cos Δφ over half a circle, 2π − 4 for 1 − |cos Δφ| over the circle.
   static Row integrate(float theta) {
     constexpr int kSteps = 256;
     Row row;
@@ -104,7 +105,7 @@ float angleOf(const Vec3& w) {
   return std::acos(std::clamp(w.z(), 0.0f, 1.0f));
 }
 
-/// Cosine between the azimuths; 1 where one has none.
+/// Cosine of the difference of azimuths; 1 if a direction is the normal.
 float azimuthCosine(const Vec3& wo, const Vec3& wi) {
   const float lengths = wo.head<2>().norm() * wi.head<2>().norm();
   return lengths > 0.0f ? std::clamp(wo.head<2>().dot(wi.head<2>()) / lengths, -1.0f, 1.0f) : 1.0f;
@@ -126,15 +127,15 @@ class RoughDiffuse final : public Bsdf {
     const float once = c.constant + c.towards * cosPhi * (std::sin(a.alpha) - away) * tangent(a) +
                        c.oblique * (1.0f - std::abs(cosPhi)) * obliqueTerm(a);
     const float twice = c.interreflected * (1.0f - cosPhi * (a.beta / kHalfPi) * (a.beta / kHalfPi));
-    // Rough surfaces against the light at grazing angles go below zero in the model.
+    // The model is negative for rough surfaces seen against the light at grazing angles.
     return (rho * kInvPi * (once + rho * twice)).max(0.0f);
   }
 
-  // By the cosine, or evenly: towards grazing angles the model throws light back without a bound on its value, but with
-  // one on its product with the cosine.
+  // Mixes cosine-weighted and uniform sampling: at grazing angles retroreflection makes the value of the model
+  // unbounded, but not its product with the cosine.
   std::optional<BsdfSample> sample(const Vec3& wo, const Vec2& uv, float choice, const Vec2& u) const override {
     Vec3 wi = squareToCosineHemisphere(u);
-    if (choice < evenFraction(uv)) {
+    if (choice < uniformFraction(uv)) {
       wi = squareToSphere(u);
       wi.z() = std::abs(wi.z());
     }
@@ -145,10 +146,10 @@ class RoughDiffuse final : public Bsdf {
 
   float pdf(const Vec3& wo, const Vec3& wi, const Vec2& uv) const override {
     if (!(wo.z() > 0.0f && wi.z() > 0.0f)) return 0.0f;
-    return std::lerp(cosineHemispherePdf(wi), 0.5f * kInvPi, evenFraction(uv));
+    return std::lerp(cosineHemispherePdf(wi), 0.5f * kInvPi, uniformFraction(uv));
   }
 
-  /// A constant of the albedo, which is most of it.
+  /// Approximates the model by a constant with the same albedo.
   LobeMixture mixture(const Vec3& wo, const Vec2& uv) const override {
     LobeMixture result;
     result.constant = luminance(albedo(wo, uv));
@@ -169,7 +170,7 @@ class RoughDiffuse final : public Bsdf {
     return coefficientsOf(std::max(0.0f, alpha_->evalNumber(uv)), fast_);
   }
 
-  float evenFraction(const Vec2& uv) const {
+  float uniformFraction(const Vec2& uv) const {
     const Coefficients c = coefficients(uv);
     return c.towards / (c.constant + c.towards);
   }

@@ -73,7 +73,7 @@ class RoughPlastic final : public Bsdf {
   Rgb baseColour(const LocalRoughness& roughness, const Vec2& uv) const {
     return base_.colour(uv, transmittance_.internalReflectance(roughness));
   }
-  /// What is not let through; light lost between facets counts as reflected.
+  /// Everything that is not transmitted; energy that single scattering loses between facets counts as reflected.
   Rgb glossyAlbedo(const LocalRoughness& roughness, const Vec3& wo, const Vec2& uv) const {
     return (1.0f - transmittance_(roughness, wo.z())) * specular_->eval(uv);
   }
@@ -90,7 +90,7 @@ class RoughPlastic final : public Bsdf {
   Roughness roughness_;
   double eta_;
   VaryingTransmittance transmittance_;
-  std::vector<LobePtr> lobes_;  ///< one for each level
+  std::vector<LobePtr> lobes_;  ///< one for each roughness level
   DiffuseBase base_;
   TexturePtr specular_;
 };
@@ -99,7 +99,8 @@ class RoughPlastic final : public Bsdf {
 
 BsdfPtr makeRoughPlastic(const Parameters& parameters) {
   Roughness roughness = Roughness::read(parameters);
-  if (!roughness.isotropic()) throw ParameterError("alpha_u", "roughplastic is isotropic: give alpha");
+  if (!roughness.isotropic())
+    throw ParameterError("alpha_u", "roughplastic must be isotropic: give alpha instead of alpha_u and alpha_v");
   const double eta = readRelativeIor(parameters, "polypropylene");
   DiffuseBase base{readReflectance(parameters, {"diffuse_reflectance", grey(0.5f)}),
                    static_cast<float>(1.0 / (eta * eta)), parameters.flag("nonlinear", false)};

@@ -1,4 +1,5 @@
-// A thin slab of a dielectric, as a window pane: reflection within the slab is summed, the shift of the ray left out.
+// A thin slab of a dielectric, such as a window pane: sums the reflections within the slab and neglects the offset of
+// the transmitted ray.
 
 #include <cmath>
 

@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kBlack = -1, kWhite = -2;
 
-/// The pixel column or row that index i, any number, falls on, or what is there instead.
+/// Maps any integer i to a pixel column or row, or to kBlack or kWhite outside the image.
 int wrapIndex(long i, int size, Wrap mode) {
   if (mode == Wrap::zero || mode == Wrap::one) {
     if (i >= 0 && i < size) return static_cast<int>(i);
@@ -25,7 +25,7 @@ int wrapIndex(long i, int size, Wrap mode) {
   return static_cast<int>(r < size ? r : period - 1 - r);
 }
 
-// Beyond this, floats have no fraction left, and casts to integers would overflow further on.
+// Floats above this have no fractional part, and much larger ones would overflow in casts to integers.
 constexpr float kLargestCoordinate = 1e7f;
 
 Rgb meanOf(const Image& image) {
@@ -34,7 +34,7 @@ Rgb meanOf(const Image& image) {
   return (sum / static_cast<double>(image.pixels.size())).cast<float>();
 }
 
-/// Interpolation stays between pixels. Pixels that are not numbers do not count.
+/// Bounds of the pixels' luminance, which interpolation does not exceed. NaN pixels are ignored.
 TextureRange rangeOf(const Image& image) {
   TextureRange range{std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()};
   for (const Rgb& pixel : image.pixels) {
@@ -52,7 +52,7 @@ class BitmapTexture final : public Texture {
   Rgb eval(const Vec2& uv) const override {
     const Vec2 st = options_.uvMap(uv);
     const float x = st.x() * static_cast<float>(image_->width), y = st.y() * static_cast<float>(image_->height);
-    // Written so that NaN is caught, too.
+    // Negated, so that NaN returns the mean, too.
     if (!(std::abs(x) < kLargestCoordinate && std::abs(y) < kLargestCoordinate)) return mean_;
     return options_.nearest ? pixel(std::floor(x), std::floor(y)) : bilinear(x - 0.5f, y - 0.5f);
   }

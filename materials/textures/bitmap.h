@@ -1,5 +1,5 @@
 #pragma once
-// A texture looked up in an image.
+// A texture that looks up its values in an image.
 
 #include <memory>
 
@@ -9,19 +9,19 @@
 
 namespace lobe {
 
-/// What lies outside the unit square: the image again, its mirror image, its border pixels for ever, black or white.
+/// Values outside the unit square: the image is repeated, mirrored or extended by its border pixels, or the value is
+/// black (zero) or white (one).
 enum class Wrap { repeat, mirror, clamp, zero, one };
 
 struct BitmapOptions {
   Wrap wrapU = Wrap::repeat, wrapV = Wrap::repeat;
-  bool nearest = false;  ///< one pixel instead of bilinear interpolation
-  UvMap uvMap = {};      ///< from the surface's coordinates to the image's
+  bool nearest = false;  ///< nearest pixel instead of bilinear interpolation
+  UvMap uvMap = {};      ///< maps surface coordinates to image coordinates
 };
 
-/// The image over the unit square, its first row at v = 0 as in Mitsuba: pixel (x, y) has its centre at
-/// ((x + ½)/width, (y + ½)/height). Coordinates that are not finite or too large for floats to tell pixels apart give
-/// the mean, which is that of the image itself. Several textures may share one image. Throws std::runtime_error when
-/// the image is empty.
+/// Maps the image to the unit square, with its first row at v = 0 as in Mitsuba: pixel (x, y) has its centre at ((x +
+/// ½)/width, (y + ½)/height). Coordinates that are not finite, or too large for float precision to resolve pixels,
+/// return the mean of the image. Several textures may share one image. Throws std::runtime_error if the image is empty.
 TexturePtr makeBitmap(std::shared_ptr<const Image> image, const BitmapOptions& options = {});
 
 }  // namespace lobe

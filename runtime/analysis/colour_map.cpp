@@ -29,7 +29,8 @@ Colour oklch(double lightness, double chroma, double hue) {
 
 Colour sequentialColour(double t) {
   const double x = std::clamp(t, 0.0, 1.0);
-  // As much chroma as sRGB has on the whole way, more where there is more: what is cut off shows as an edge.
+  // Chroma stays within the sRGB gamut, which allows more of it in the upper half; clipping would be visible as an
+  // edge.
   const double upper = std::max(0.0, 2 * x - 1);
   return oklch(0.24 + 0.69 * x, 0.095 + 0.1 * upper * upper, 310 - 200 * x);
 }

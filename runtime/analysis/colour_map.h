@@ -1,5 +1,5 @@
 #pragma once
-// Colours for numbers, along paths whose lightness is even to the eye: circles of hue in Oklab (Ottosson 2020).
+// Colour maps with perceptually uniform lightness, defined in Oklab (Ottosson 2020).
 
 #include <array>
 
@@ -8,10 +8,10 @@ namespace lobe {
 /// Red, green and blue in [0, 1], encoded as sRGB.
 using Colour = std::array<float, 3>;
 
-/// From dark violet over green to light yellow, lightness rising linearly. t is clamped to [0, 1].
+/// From dark violet over green to light yellow, with linearly increasing lightness. t is clamped to [0, 1].
 Colour sequentialColour(double t);
 
-/// Blue below 0, white at 0, red above, equally light at equal distance. t is clamped to [-1, 1].
+/// Blue for negative t, white at 0, red for positive t; lightness depends on |t| only. t is clamped to [-1, 1].
 Colour divergingColour(double t);
 
 }  // namespace lobe

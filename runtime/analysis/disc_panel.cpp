@@ -11,19 +11,20 @@ namespace {
 constexpr int kRing = 6;  // pixels
 constexpr Colour kBeyond{0.85f, 0.85f, 0.85f}, kEllipse{1, 0.25f, 0.2f};
 
-/// How much of a pixel a line of the given width covers, `distance` pixels off.
+/// Fraction of a pixel that is covered by a line of the given width at `distance` from its centre, both in pixels.
 double coverage(double distance, double width) {
   return std::clamp(0.5 * width + 0.5 - std::abs(distance), 0.0, 1.0);
 }
 
-/// In pixels from the corner, moved inside to where a ring is whole when it is out of view.
+/// The point in pixels from the panel's corner; points out of view are moved inside the border, so that the ring is
+/// drawn whole.
 Vec2 pixelInView(const Panel& panel, const Vec2& y) {
   const Vec2 d = (y - panel.view.centre) / panel.step();
   const float middle = 0.5f * kPanel, limit = d.cwiseAbs().maxCoeff() > middle ? middle - kRing - 3 : middle;
   return {middle + std::clamp(d.x(), -limit, limit), middle - std::clamp(d.y(), -limit, limit)};
 }
 
-/// Distances from the ellipse to first order: Mahalanobis distance over the length of its gradient.
+/// The distance from the ellipse is approximated to first order: Mahalanobis distance over the length of its gradient.
 void drawEllipse(Raster& raster, const Panel& panel, const Gaussian& g, double opacity) {
   const Eigen::Matrix2f cov{{g.cov.xx, g.cov.xy}, {g.cov.xy, g.cov.yy}};
   const Eigen::Matrix2d inverse = cov.cast<double>().inverse();

@@ -11,31 +11,31 @@ namespace lobe {
 namespace {
 
 constexpr float kMinNormalCosine = 0.707f;
-// Long enough to meet most places that the picture depends on.
+// Long enough for paths to reach most points that contribute to the image.
 constexpr int kReceiverDepth = 8;
 
 Receiver receiverOf(const SurfaceHit& hit) {
   return {hit, std::copysign(1.0f, hit.normal.dot(hit.woWorld)) * hit.normal};
 }
 
-/// Samples as the BSDF does, and notes where.
-struct NotingSampler {
+/// Samples the BSDF and collects the receivers on the path.
+struct CollectingSampler {
   std::vector<Receiver>& receivers;
 
   class Vertex : public BsdfSampler::Vertex {
    public:
-    Vertex(const NotingSampler& sampler, const SurfaceHit& hit) : BsdfSampler::Vertex({}, hit) {
+    Vertex(const CollectingSampler& sampler, const SurfaceHit& hit) : BsdfSampler::Vertex({}, hit) {
       sampler.receivers.push_back(receiverOf(hit));
     }
   };
 };
 
-/// What BSDF sampling is left with of light straight from an emitter (see the header).
+/// Multiple importance weight of cosine-weighted sampling for light straight from an emitter (see the header).
 float directFraction(float cosine, float emitterPdf) {
   return misWeight(std::max(cosine * kInvPi, 1e-6f), emitterPdf);
 }
 
-/// Without a reflectance the guided part of the density is the illumination's alone.
+/// With an empty reflectance, the guided part of the density is the illumination mixture alone.
 GuidedDensity guidedDensity(const PackedRecord& record) {
   static const Reflectance none{};
   return {none, record, kGuidedProbabilities};
@@ -64,7 +64,7 @@ std::vector<Receiver> receiversOfPaths(const RenderScene& scene, const RayCamera
     const Ray ray = camera.sample(static_cast<int>(pixel.x() * static_cast<float>(camera.width())),
                                   static_cast<int>(pixel.y() * static_cast<float>(camera.height())), rng);
     std::vector<Receiver> vertices;
-    const NotingSampler sampler{vertices};
+    const CollectingSampler sampler{vertices};
     PathLoop(scene, options, sampler).radiance(ray, rng, statistics);
     if (vertices.empty()) continue;
     chosen.push_back(vertices[static_cast<std::size_t>(rng.uniform() * static_cast<float>(vertices.size()))]);
@@ -87,7 +87,7 @@ std::optional<Receiver> firstReceiver(const RenderScene& scene, Ray ray) {
 
 ServedDensity::ServedDensity(const IlluminationCache& cache, const Receiver& receiver)
     : record_(cache.find(receiver.point.position, receiver.normal)),
-      frame_(record_ ? Frame::fromTangent(receiver.normal, record_->tangent) : Frame::fromNormal(receiver.normal)) {}
+      frame_(record_ ? Frame::fromTangent(receiver.normal, record_->tangent()) : Frame::fromNormal(receiver.normal)) {}
 
 float ServedDensity::mixture(const Vec3& wi) const {
   const Vec3 local = frame_.toLocal(wi);
@@ -109,7 +109,7 @@ std::optional<Vec3> ServedDensity::sample(float choice, const Vec2& u) const {
 
 namespace {
 
-/// Draws the directions and looks into them.
+/// Samples directions and estimates the radiance along them.
 class DirectionSampler {
  public:
   DirectionSampler(const RenderScene& scene, const Integrator& paths, const Receiver& receiver,
@@ -120,18 +120,18 @@ class DirectionSampler {
     overDisc();
     for (int i = 0; i < options_.mixture; ++i) {
       const float choice = rng_.uniform();
-      if (const std::optional<Vec3> wi = near_.sample(choice, rng_.uniform2())) look(*wi, i % 2 == 0);
+      if (const std::optional<Vec3> wi = near_.sample(choice, rng_.uniform2())) addSample(*wi, i % 2 == 0);
     }
     if (environment())
       for (int i = 0; i < options_.environment; ++i)
-        if (const auto sample = environment()->sample(rng_.uniform2())) look(sample->wi, i % 2 == 0);
+        if (const auto sample = environment()->sample(rng_.uniform2())) addSample(sample->wi, i % 2 == 0);
     return std::move(samples_);
   }
 
  private:
   const EnvironmentLight* environment() const { return scene_.lights.environment(); }
 
-  /// Uniform over the square around the disc, of which the corners are empty.
+  /// Stratified over the square around the disc; samples in its corners are discarded.
   void overDisc() {
     const float side = 2.0f / static_cast<float>(options_.cells);
     for (int row = 0; row < options_.cells; ++row)
@@ -140,7 +140,7 @@ class DirectionSampler {
           const Vec2 jitter = rng_.uniform2();
           const Vec2 cell(static_cast<float>(column), static_cast<float>(row));
           const Vec2 y = Vec2::Constant(-1) + side * (cell + jitter);
-          if (insideDisc(y)) look(near_.frame().toWorld(fromDisc(y)).normalized(), i % 2 == 0);
+          if (insideDisc(y)) addSample(near_.frame().toWorld(fromDisc(y)).normalized(), i % 2 == 0);
         }
   }
 
@@ -151,7 +151,7 @@ class DirectionSampler {
     return sum;
   }
 
-  void look(const Vec3& wi, bool firstHalf) {
+  void addSample(const Vec3& wi, bool firstHalf) {
     const float cosine = receiver_.cosine(wi);
     if (!(cosine > 0)) return;
     const Ray ray = spawnRay(receiver_.point, wi);
@@ -192,7 +192,7 @@ std::optional<double> IncidentRadiance::nev(const std::function<double(const Vec
   double square = 0;
   std::array<double, 2> halves{};
   for (const Sample& s : samples_) {
-    // A half has half the directions: each stands for twice as much.
+    // Each half has half of the directions, so its samples have twice the weight.
     halves[s.firstHalf ? 0 : 1] += (s.first + s.second) / s.density;
     const double product = s.first * s.second;
     if (product > 0) square += product / (s.density * pdf(s.wi));

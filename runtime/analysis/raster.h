@@ -1,5 +1,5 @@
 #pragma once
-// A picture of coloured pixels in memory, and how it becomes a file.
+// An 8-bit colour image in memory that can be written as a PNG.
 
 #include <cstdint>
 #include <filesystem>
@@ -17,10 +17,10 @@ class Raster {
   int height() const { return height_; }
   Colour at(int x, int y) const;
   void set(int x, int y, const Colour& colour);
-  /// Mixes `share` of the colour into a pixel.
+  /// Blends a colour over a pixel; `fraction` is its opacity.
   void blend(int x, int y, const Colour& colour, double fraction);
 
-  /// As a PNG, the whole file or none. Throws std::runtime_error that names the file.
+  /// Writes a PNG atomically. Throws std::runtime_error that names the file.
   void write(const std::filesystem::path& path) const;
 
  private:

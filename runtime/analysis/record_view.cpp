@@ -20,7 +20,7 @@ constexpr int kTextGap = 4;
 constexpr int kLine = kTextHeight + kTextGap;
 constexpr int kColumns = 3;
 
-/// Weights in cells, as a density over the disc.
+/// A histogram of weights over the disc, normalised to a density.
 class Histogram {
  public:
   void add(const Vec2& y, double weight) {
@@ -42,7 +42,7 @@ class Histogram {
   double total_ = 0;
 };
 
-/// What the record's neighbourhood held, in the frame that it learnt in.
+/// The particles around the record, in the record's frame.
 Neighbourhood neighbourhoodOf(const IlluminationRecord& record, const RenderScene& scene,
                               const TrainedIllumination& illumination, const FieldOptions& options) {
   const SampleStorageData& particles = dataOf(illumination.particles);
@@ -79,7 +79,7 @@ double degreesBetween(const Vec3& a, const Vec3& b) {
 std::string captionOf(const Receiver& receiver, const ServedDensity& density, const IlluminationRecord& record,
                       const IncidentRadiance& light) {
   return fmt::format(
-      "position {}  normal {}  radius {:.3g}  seen {:.3g} off, turned {:.0f}\n"
+      "position {}  normal {}  radius {:.3g}  distance {:.3g}, angle {:.0f}\n"
       "samples {:.0f}  gaussians {}  background {:.2f}  NEV {}  with half cosine {}",
       numbers(record.position), numbers(record.normal), record.radius,
       (receiver.point.position - record.position).norm(), degreesBetween(receiver.normal, record.normal),
@@ -102,7 +102,7 @@ struct Field {
   DiscFunction density;
 };
 
-/// On one scale.
+/// Draws all panels on the same scale.
 void drawPanels(Raster& raster, const std::array<Field, kColumns>& fields) {
   double peak = 0;
   for (int i = 0; i < kColumns; ++i) peak = std::max(peak, largest(panelAt(i), fields[i].density));
@@ -123,18 +123,17 @@ void drawCaption(Raster& raster, const std::string& caption) {
 
 Receiver receiverAt(const RenderScene& scene, const RayCamera& camera, int x, int y) {
   if (x < 0 || y < 0 || x >= camera.width() || y >= camera.height())
-    throw NoRecord(fmt::format("the picture has {}x{} pixels", camera.width(), camera.height()));
+    throw NoRecord(fmt::format("the image has {}x{} pixels", camera.width(), camera.height()));
   const Vec2 middle(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
   const std::optional<Receiver> receiver = firstReceiver(scene, camera.rayThrough(middle));
-  if (!receiver) throw NoRecord("no surface that scatters light is seen there");
+  if (!receiver) throw NoRecord("no surface that scatters light is visible there");
   return *receiver;
 }
 
 RecordView viewRecord(const RenderScene& scene, const Receiver& receiver, const TrainedIllumination& illumination,
                       const FieldOptions& options) {
   const ServedDensity density(cacheOf(illumination.field), receiver);
-  if (!density.record())
-    throw NoRecord(fmt::format("no record serves the point {} seen there", numbers(receiver.point.position)));
+  if (!density.record()) throw NoRecord(fmt::format("no record serves the point {}", numbers(receiver.point.position)));
   const IlluminationRecord record = cacheOf(illumination.field).unpacked(*density.record());
 
   const Neighbourhood around = neighbourhoodOf(record, scene, illumination, options);
@@ -147,9 +146,9 @@ RecordView viewRecord(const RenderScene& scene, const Receiver& receiver, const 
   RecordView view{paper(), captionOf(receiver, density, record, light)};
   drawPanels(view.raster,
              {{{"mixture", [&](const Vec2& y) { return 2.0 * density.mixture(density.frame().toWorld(fromDisc(y))); }},
-               {around.points.empty() ? "particles: none kept" : fmt::format("particles: {}", around.points.size()),
+               {around.points.empty() ? "particles: not kept" : fmt::format("particles: {}", around.points.size()),
                 [&](const Vec2& y) { return particles.density(y); }},
-               {"light left to guiding x cosine: path traced", [&](const Vec2& y) { return truth.density(y); }}}});
+               {"path-traced reference", [&](const Vec2& y) { return truth.density(y); }}}});
   drawEllipses(view.raster, panelAt(0), record.gaussians());
   drawCaption(view.raster, view.caption);
   return view;

@@ -1,14 +1,15 @@
 #pragma once
-// A record of the trained illumination as a picture over the disc of directions: what it holds, what it learnt from
-// last, and what it was to learn.
+// An image of one illumination record over the disc of directions: its mixture, the particles around it, and the
+// incident-radiance reference.
 //
-// Three panels from the left, all densities over the disc on one logarithmic scale that ends kRecordDecades below the
-// largest of them: the mixture, with the ellipses of its Gaussians; the particles around the record, in cells; f of
-// received_light.h (the incident radiance × cosθ by path tracing, without what emitter sampling finds) at the place
-// looked at, in the same cells. z is the normal and x the record's tangent: mixture and particles stand in the record's
-// frame, the light in that of the place, as the renderer puts the mixture there. Two lines of numbers stand below: the
-// record's position and normal, how far from it the place is and by how many degrees its normal is turned; then what it
-// has learnt from and the NEV of the mixture, alone and half and half with the cosine.
+// Three panels from left to right show densities over the disc on one logarithmic scale, from the largest value down to
+// kRecordDecades below it: the mixture with the ellipses of its Gaussians; a histogram of the particles around the
+// record; and, in the same cells, the reference f of incident_radiance.h (path-traced incident radiance × cosθ without
+// the part that next-event estimation finds) at the selected surface point. z is the normal and x the record's tangent.
+// Mixture and particles are shown in the frame of the record, the reference in that of the selected point, where the
+// renderer evaluates the mixture. The text below gives the position and normal of the record, the distance of the
+// selected point and the angle between the normals in degrees, the number of samples that the record has learnt from,
+// and the relative variance (NEV) of the mixture alone and of the mean of mixture and cosine density.
 
 #include <stdexcept>
 #include <string>
@@ -22,7 +23,7 @@ namespace lobe {
 
 inline constexpr double kRecordDecades = 3;
 
-/// Why there is no picture of a record.
+/// Thrown if no record can be shown; the message says why.
 class NoRecord : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -30,15 +31,15 @@ class NoRecord : public std::runtime_error {
 
 struct RecordView {
   Raster raster;
-  std::string caption;  ///< the lines of numbers below
+  std::string caption;  ///< the text below the panels
 };
 
-/// What the middle of a pixel shows, see firstReceiver. Throws NoRecord when the pixel is outside the picture or shows
-/// no surface that scatters light.
+/// The surface point at the centre of a pixel, see firstReceiver. Throws NoRecord if the pixel is outside the image or
+/// shows no surface that scatters light.
 Receiver receiverAt(const RenderScene& scene, const RayCamera& camera, int x, int y);
 
-/// Of the record that serves a receiver. Without particles (trained elsewhere, or not kept) their panel stays empty.
-/// options: what was trained with. Throws NoRecord when none serves it.
+/// Shows the record that serves a receiver. If the particles were not kept, or the illumination was read from a file,
+/// their panel is empty. options: those of the training. Throws NoRecord if no record serves the receiver.
 RecordView viewRecord(const RenderScene& scene, const Receiver& receiver, const TrainedIllumination& illumination,
                       const FieldOptions& options);
 

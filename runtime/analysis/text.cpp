@@ -8,7 +8,7 @@ namespace {
 
 constexpr int kColumns = 3, kRows = 5, kScale = 2;
 
-// An octal digit is a row of three pixels, the first digit the top row.
+// Each octal digit is a row of three pixels, the first digit the top row.
 constexpr std::uint16_t kDigits[] = {075557, 026227, 071747, 071717, 055711, 074717, 074757, 071222, 075757, 075717};
 constexpr std::uint16_t kLetters[] = {025755, 065656, 034443, 065556, 074647, 074644, 034553, 055755, 072227,
                                       011152, 055655, 044447, 057755, 065555, 075557, 065644, 025573, 065655,

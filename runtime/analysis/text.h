@@ -1,5 +1,5 @@
 #pragma once
-// A small font of capitals, digits and signs, for captions.
+// A small bitmap font of capitals, digits and punctuation, for captions.
 
 #include <string_view>
 
@@ -7,10 +7,10 @@
 
 namespace lobe {
 
-inline constexpr int kTextAdvance = 8, kTextHeight = 10;  ///< pixels of a character
+inline constexpr int kTextAdvance = 8, kTextHeight = 10;  ///< pixels per character
 
-/// One line with its top left corner at (x, y). Letters become capitals; what the font lacks is a blank. What does not
-/// fit into the raster is left out.
+/// Draws one line of text with its top left corner at (x, y), clipped to the raster. Letters are drawn as capitals,
+/// characters that the font lacks as blanks.
 void drawText(Raster& raster, int x, int y, std::string_view text, const Colour& colour);
 
 }  // namespace lobe

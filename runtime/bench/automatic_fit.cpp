@@ -15,7 +15,7 @@ constexpr double kLeastDensity = 1e-30;
 
 template <class T>
 struct Component {
-  T weight, x, y, xx, xy, yy;  // xx, xy, yy of Σ⁻¹; weight with the factor of the normal density
+  T weight, x, y, xx, xy, yy;  // xx, xy, yy of Σ⁻¹; weight includes the normalisation of the Gaussian
 };
 
 template <class T>
@@ -74,7 +74,7 @@ void solve(const FitPoints& points, Eigen::VectorXd& parameters) {
 }  // namespace
 
 Mixture refineAutomatically(const FitPoints& points, std::span<const Gaussian> start) {
-  // Steps that overflow are rejected, as they should be, but with a page of warnings each.
+  // Ceres correctly rejects steps that overflow, but prints a page of warnings for each.
   FLAGS_minloglevel = google::GLOG_FATAL;
   Eigen::VectorXd parameters = toParameters(start, points.whitening);
   switch (start.size()) {
@@ -91,7 +91,7 @@ Mixture refineAutomatically(const FitPoints& points, std::span<const Gaussian> s
       solve<8>(points, parameters);
       break;
     default:
-      throw std::runtime_error("the fit with automatic derivatives is made for 1, 2, 4 or 8 components");
+      throw std::runtime_error("the fit with automatic derivatives supports 1, 2, 4 or 8 components only");
   }
   const std::span<const double> found(parameters.data(), static_cast<std::size_t>(parameters.size()));
   return toMixture(fromParameters(found, points.whitening), points.whitening);

@@ -1,5 +1,5 @@
 #pragma once
-// The fit as it is made without thought, to be compared with: Eq. 8 of Herholz et al. 2016, automatic derivatives, QR.
+// The baseline of the fit: Eq. 8 of Herholz et al. 2016, minimised with automatic derivatives and dense QR.
 
 #include <span>
 
@@ -7,8 +7,9 @@
 
 namespace lobe {
 
-/// The start refined by ceres::Solve as it stops by default, on one thread. points: for FitObjective::reflectance. The
-/// parameters are those of refineMixture. The start has 1, 2, 4 or 8 components; else std::runtime_error.
+/// Refines the start with ceres::Solve and its default termination criteria on one thread. points: for
+/// FitObjective::reflectance. The parameters are those of refineMixture. Throws std::runtime_error unless the start has
+/// 1, 2, 4 or 8 components.
 Mixture refineAutomatically(const FitPoints& points, std::span<const Gaussian> start);
 
 }  // namespace lobe

@@ -1,5 +1,5 @@
-// lobebench-caches: whole caches by several ways to fit: time, size, and the quality that look-ups between records
-// meet.
+// lobebench-caches: compares fit methods on whole caches by time, size, and the relative variance (NEV) of look-ups
+// between records.
 
 #include <algorithm>
 #include <array>
@@ -41,7 +41,7 @@ CompileOptions optionsOf(const std::string& way) {
   CompileOptions options;
   options.settings.reduction = 0;
   const std::optional<FitMethod> method = fitMethodOf(way.substr(0, way.find(':')));
-  if (!method) throw UsageError(fmt::format("unknown method '{}'", way));
+  if (!method) throw UsageError(fmt::format("--way: unknown method '{}'", way));
   options.settings.method = *method;
   if (const std::size_t colon = way.find(':'); colon != std::string::npos)
     options.settings.quality = std::stof(way.substr(colon + 1));
@@ -49,14 +49,14 @@ CompileOptions optionsOf(const std::string& way) {
   return options;
 }
 
-/// Even in elevation, at azimuths that favour none; none of them is a grid's.
+/// Uniform in elevation, at varying azimuths; none coincides with a direction of a grid.
 Vec3 queryDirection(int i) {
   const double theta = kLastElevation * (i + 0.5) / kDirections * std::numbers::pi / 180, phi = 2.4 * i + 0.3;
   return {static_cast<float>(std::sin(theta) * std::cos(phi)), static_cast<float>(std::sin(theta) * std::sin(phi)),
           static_cast<float>(std::cos(theta))};
 }
 
-/// What a look-up for wo is worth; without components the lobe's own sampler is all there is, and it is not graded.
+/// The relative variance of a look-up for wo; nullopt without components, where only the lobe's own sampler is used.
 std::optional<double> servedNev(const Lobe& lobe, const DirectionGrid& grid, const FittedGrid& fit, const Vec3& wo) {
   std::array<Gaussian, kMaxCacheComponents> room;
   const std::span<const Gaussian> mixture = fit.mixtureFor(grid, wo, room);
@@ -64,7 +64,8 @@ std::optional<double> servedNev(const Lobe& lobe, const DirectionGrid& grid, con
   return gradeMixture(lobe, wo, mixture, kGradeSamples).worse();
 }
 
-/// NEVs of fits made for the directions themselves, by the best method with as many components as there may be.
+/// Relative variances of fits for the directions themselves, by the most accurate method and with the maximum number of
+/// components.
 std::vector<double> ownNevs(const Lobe& lobe, const CompileOptions& options) {
   FitSettings settings = options.settings;
   settings.method = FitMethod::ceres;
@@ -104,7 +105,7 @@ nlohmann::ordered_json measure(const LobeUse& use, const std::string& way, const
   return row;
 }
 
-// ---- Textured roughness: what is looked up for an alpha in the middle between two levels is a mixture of theirs.
+// ---- Textured roughness: a look-up for an alpha halfway between two levels blends the mixtures of both.
 
 struct FittedLevel {
   double alpha;
@@ -119,7 +120,7 @@ LobePtr conductorLobe(const char* distribution, double alpha) {
   return makeBsdf("roughconductor", parameters)->lobes().front();
 }
 
-/// Both levels have the same share of the reflectance, so each weighs by its integral.
+/// Both levels have the same interpolation weight, so each is weighted by its integral.
 Mixture betweenLevels(const FittedLevel& a, const FittedLevel& b, const Vec3& wo) {
   Mixture mixture;
   double sum = 0;
@@ -153,7 +154,7 @@ nlohmann::ordered_json measureBetween(const char* distribution, const std::strin
   return row;
 }
 
-/// Of the levels that are fitted: narrower ones are left to the BSDF.
+/// Fits all levels. Those too narrow to be fitted are left out, because the renderer samples the BSDF there.
 std::vector<FittedLevel> fitLevels(const char* distribution, const std::string& way) {
   std::vector<FittedLevel> levels;
   for (int i = 0; i < kRoughnessLevels; ++i) {
@@ -178,7 +179,7 @@ void runLevels(const Options& o) {
 }
 
 void run(const Options& o) {
-  // One thread: times are then those of the work.
+  // One thread, so that times measure the work.
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
   ReadOptions read = o.read;
   read.geometry = false;
@@ -196,10 +197,11 @@ void run(const Options& o) {
 }
 
 void declare(CLI::App& app, Options& o) {
-  auto* scene = app.add_option("scene", o.scene, "Scene of which the lobes are fitted");
-  auto* levels = app.add_flag("--levels", o.levels, "Instead: the levels of textured roughness, graded between them");
+  auto* scene = app.add_option("scene", o.scene, "Mitsuba scene file (XML) whose lobes are fitted");
+  auto* levels =
+      app.add_flag("--levels", o.levels, "Fit the levels of textured roughness instead, and grade between them");
   levels->excludes(scene);
-  app.add_option("--way", o.ways, "wem, ceres, eq8 or auto:QUALITY; may be repeated")->required();
+  app.add_option("--way", o.ways, "Fit method: wem, ceres, eq8 or auto:QUALITY; may be repeated")->required();
   addDefinitions(app, o.read.definitions);
 }
 
@@ -208,11 +210,13 @@ void declare(CLI::App& app, Options& o) {
 int main(int argc, char** argv) {
   Options options;
   return lobe::runTool(
-      "lobebench-caches", "Fits the lobes of a scene in several ways, and grades what look-ups meet; prints JSON.",
+      "lobebench-caches",
+      "Fits the lobes of a scene with several methods and measures the relative variance (NEV) of look-ups; prints "
+      "JSON.",
       argc, argv, [&](CLI::App& app) { declare(app, options); },
       [&] {
         if (options.levels) return runLevels(options);
-        if (options.scene.empty()) throw UsageError("a scene or --levels is needed");
+        if (options.scene.empty()) throw UsageError("a scene or --levels is required");
         run(options);
       });
 }

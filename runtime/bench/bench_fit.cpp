@@ -1,5 +1,5 @@
-// lobebench-fit: time and quality of one record by each way to fit it, against Ceres with automatic derivatives; and
-// what method auto spends on a whole lobe.
+// lobebench-fit: time and relative variance (NEV) of fits of one record by each method, compared with Ceres with
+// automatic derivatives; and the time of method auto for a whole lobe.
 
 #include <algorithm>
 #include <chrono>
@@ -26,7 +26,7 @@ using namespace lobe;
 
 constexpr std::uint32_t kGradeSamples = 16384;
 constexpr double kElevations[] = {0, 15, 30, 45, 60, 70, 75, 80, 85, 88, 89, 89.5};
-constexpr double kLastGated = 88;  // beyond, grazing light is too rare to matter
+constexpr double kLastGated = 88;  // degrees; beyond it grazing light is too rare to matter
 constexpr double kNeighbour = 1;   // degrees, the spacing of a fine grid
 
 struct Options {
@@ -74,7 +74,7 @@ struct Row {
   double elevation, milliseconds, nev;
 };
 
-/// A whole lobe by method auto, on one thread.
+/// The fit of a whole lobe by method auto on one thread.
 struct WholeLobe {
   std::string surface;
   int directions;
@@ -82,7 +82,7 @@ struct WholeLobe {
   double milliseconds;
 };
 
-/// The median time of making a mixture.
+/// A mixture and the median time of making it, in milliseconds.
 template <class F>
 std::pair<Mixture, double> timed(int repeats, const F& make) {
   std::vector<double> times;
@@ -104,7 +104,7 @@ FitSettings settingsFor(FitMethod method, const Options& o) {
   return settings;
 }
 
-/// The neighbour's mixture, moved as along a chain of a grid.
+/// The mixture of a neighbouring direction, shifted as between consecutive directions of a grid.
 Mixture movedTo(const Vec3& wo, const Vec3& from, Mixture mixture) {
   const Vec2 step = toDisc(from) - toDisc(wo);
   for (Gaussian& g : mixture) g.meanX += step.x(), g.meanY += step.y();
@@ -177,7 +177,7 @@ void printRatio(const char* what, const std::vector<double>& ratios) {
              std::ranges::max(ratios));
 }
 
-/// How many times the fit with automatic derivatives takes longer.
+/// Prints the time of the fit with automatic derivatives divided by that of the other fits.
 void printRatios(const std::vector<Row>& rows, const std::vector<WholeLobe>& lobes) {
   std::vector<double> scratch, chained, record, entry;
   for (const WholeLobe& l : lobes) {
@@ -187,11 +187,11 @@ void printRatios(const std::vector<Row>& rows, const std::vector<WholeLobe>& lob
     record.push_back(automatic * static_cast<double>(l.records) / l.milliseconds);
     entry.push_back(automatic * l.directions / l.milliseconds);
   }
-  fmt::print("\nautomatic derivatives take so many times as long as     mean    min    max\n");
-  printRatio("ceres, with its grade", scratch);
-  printRatio("ceres from a neighbour, with its grade", chained);
-  printRatio("auto for a whole lobe, per record that it keeps", record);
-  printRatio("auto for a whole lobe, per direction that it serves", entry);
+  fmt::print("\ntime of automatic derivatives over that of               mean    min    max\n");
+  printRatio("ceres, including its grading", scratch);
+  printRatio("ceres from a neighbour, including its grading", chained);
+  printRatio("auto for a whole lobe, per record", record);
+  printRatio("auto for a whole lobe, per direction", entry);
 }
 
 void printJson(const std::vector<Row>& rows, const std::vector<WholeLobe>& lobes, const Options& o) {
@@ -228,9 +228,9 @@ void run(const Options& o) {
 }
 
 void declare(CLI::App& app, Options& o) {
-  app.add_option("--components", o.components, "Gaussians of a record: 1, 2, 4 or 8");
-  app.add_option("--surface", o.surface, "Only surfaces with this text in their names, as 'ggx 0.1'");
-  app.add_option("--repeats", o.repeats, "Runs, of which the median time counts");
+  app.add_option("--components", o.components, "Gaussians per record: 1, 2, 4 or 8");
+  app.add_option("--surface", o.surface, "Only surfaces whose names contain this text, such as 'ggx 0.1'");
+  app.add_option("--repeats", o.repeats, "Number of runs; the median time is reported");
   app.add_flag("!--no-automatic", o.automatic, "Leave out the slow fit with automatic derivatives");
   app.add_flag("--json", o.json, "Print every record as JSON");
 }
@@ -240,6 +240,6 @@ void declare(CLI::App& app, Options& o) {
 int main(int argc, char** argv) {
   Options options;
   return lobe::runTool(
-      "lobebench-fit", "Times the fit of one record by each method, and grades it.", argc, argv,
-      [&](CLI::App& app) { declare(app, options); }, [&] { run(options); });
+      "lobebench-fit", "Measures the time and the relative variance (NEV) of fits of one record by each method.", argc,
+      argv, [&](CLI::App& app) { declare(app, options); }, [&] { run(options); });
 }

@@ -1,5 +1,6 @@
-// lobebench-illumination: what passes of training are worth: how likely photons are that were not learnt from, and how
-// well the mixtures fit the light that path tracing finds at places that the camera's paths ask about.
+// lobebench-illumination: quality of trained illumination for several numbers of passes: the log-likelihood of held-out
+// particles, and the relative variance (NEV) of the mixtures with respect to the incident-radiance reference at points
+// on camera paths.
 
 #include <algorithm>
 #include <cmath>
@@ -22,7 +23,7 @@ namespace {
 
 using namespace lobe;
 
-// Of photons, receivers and the light they receive; not of training.
+// Seed of held-out photons, receivers and the incident-radiance reference, different from that of training.
 constexpr std::uint64_t kHeldOutSeed = 1000003;
 
 struct Options : BenchTraining {
@@ -32,12 +33,12 @@ struct Options : BenchTraining {
   int heldOutPhotons = 2000000;
 };
 
-/// Of all threads: what else the machine does is not counted.
+/// CPU time of all threads, which other processes do not affect.
 double processorSeconds() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
 
-/// A training, from what and how long it was.
+/// A trained illumination with its source of samples, number of passes and CPU time.
 struct Trained {
   TrainFrom from;
   int passes;
@@ -45,14 +46,14 @@ struct Trained {
   TrainedIllumination illumination;
 };
 
-/// What all trainings are graded on.
+/// The data on which all trainings are graded.
 struct HeldOut {
   std::vector<Receiver> receivers;
-  std::vector<std::vector<Particle>> particles;  ///< held out, around each receiver
-  std::vector<IncidentRadiance> light;           ///< at each receiver
+  std::vector<std::vector<Particle>> particles;  ///< held-out particles around each receiver
+  std::vector<IncidentRadiance> light;           ///< incident-radiance reference at each receiver
 };
 
-/// Photons of another seed, of the environment where importons ask for them, but guided by nothing that was learnt.
+/// Photons of a different seed. Emission from the environment is guided by importons, but scattering is not guided.
 std::vector<Particle> heldOutParticles(const RenderScene& scene, const RayCamera& camera, const Options& o) {
   const Field nothing;
   const GuidedSampler sampler(scene.scene, nothing, nullptr);
@@ -75,7 +76,7 @@ HeldOut makeHeldOut(const RenderScene& scene, const RayCamera& camera, const Opt
   const std::size_t count = heldOut.receivers.size();
   heldOut.particles.resize(count);
   heldOut.light.assign(count, IncidentRadiance({}));
-  // Guided paths: light that was scattered before it came through panes is fireflies to others.
+  // Guided paths, because light that was scattered before it passed through panes causes fireflies with other paths.
   const GuidedSampler sampler(scene.scene, best, nullptr);
   const GuidedIntegrator paths(scene, {}, sampler);
   parallelFor(std::size_t{0}, count, [&](std::size_t i) {
@@ -89,8 +90,8 @@ HeldOut makeHeldOut(const RenderScene& scene, const RayCamera& camera, const Opt
   return heldOut;
 }
 
-/// Of numbers that scatter over magnitudes: the median, nine of ten, and the geometric mean of 1 + NEV less 1, which no
-/// single receiver decides.
+/// Statistics of values that spread over magnitudes: the median, the 90th percentile, and the geometric mean of 1 + NEV
+/// minus 1, which no single receiver dominates.
 nlohmann::ordered_json summary(std::vector<double> nevs) {
   if (nevs.empty()) return nullptr;
   std::ranges::sort(nevs);
@@ -153,9 +154,9 @@ void run(Options& o) {
   std::vector<Trained> trainings;
   for (const TrainFrom from : o.sources) {
     o.plan.from = from;
-    trainings.push_back({from, 0, 0, {}});  // nothing learnt: the cosine
+    trainings.push_back({from, 0, 0, {}});  // untrained: the cosine density
     for (const int passes : o.passes) {
-      // Each from the start: so every row is what a render with that many passes gets.
+      // Every number of passes is trained from scratch, as in a render with this number of passes.
       o.plan.passes = passes;
       const double start = processorSeconds();
       TrainedIllumination illumination = trainIllumination(renderScene, camera, nullptr, o.plan);
@@ -176,8 +177,11 @@ void declare(CLI::App& app, Options& o) {
       ->delimiter(',')
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_option("--receivers", o.receivers, "Places where to look")->check(CLI::PositiveNumber)->capture_default_str();
-  app.add_option("--train", o.sources, "What records learn from: photons, paths, both, or several, separated by commas")
+  app.add_option("--receivers", o.receivers, "Number of surface points at which to grade")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--train", o.sources,
+                 "Sources of the training samples: photons, paths or both; several separated by commas")
       ->delimiter(',')
       ->transform(CLI::CheckedTransformer(trainFromNames()))
       ->default_str("both");
@@ -189,6 +193,6 @@ int main(int argc, char** argv) {
   Options options;
   return lobe::runTool(
       "lobebench-illumination",
-      "Trains a scene's illumination for several numbers of passes, and grades it; prints JSON.", argc, argv,
+      "Trains a scene's illumination with several numbers of passes and measures its quality; prints JSON.", argc, argv,
       [&](CLI::App& app) { declare(app, options); }, [&] { run(options); });
 }

@@ -1,5 +1,5 @@
-// lobebench-product: the time of one product sample with its density, ours and the paper's form, beside that of an
-// incoherent ray.
+// lobebench-product: the time of one product sample with its density, for the lazy product and the eager product of
+// Herholz et al. 2016, and the time of an incoherent ray for comparison.
 
 #include <algorithm>
 #include <ctime>
@@ -37,7 +37,7 @@ struct Options {
   std::string target;
 };
 
-/// Of this thread: what else the machine does is not counted.
+/// CPU time of this thread, which other processes do not affect.
 double threadSeconds() {
   timespec t{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
@@ -59,7 +59,7 @@ Gaussian randomGaussian(Rng& rng, float weight) {
   return g;
 }
 
-/// Records of k Gaussians in the renderer's layout, in an order that no cache foresees.
+/// Records of k Gaussians in the renderer's memory layout, in random order, so that the hardware cannot prefetch them.
 class Lights {
  public:
   Lights(int components, int count) {
@@ -101,7 +101,8 @@ std::vector<Reflectance> reflectances(int components) {
   return all;
 }
 
-/// Random numbers made beforehand: they are not what is timed. So many that no branch can be learnt by heart.
+/// Random numbers generated in advance, so that they are not timed. There are too many of them for branch predictors to
+/// learn.
 struct Draw {
   float choice;
   Vec2 u;
@@ -117,7 +118,7 @@ std::vector<Draw> draws() {
   return all;
 }
 
-/// Samples with their densities, one a record, in the records' order from `first` on.
+/// Times samples with their densities, one per record, in the order of the records.
 class SampleTimer {
  public:
   SampleTimer(int reflectanceComponents, const Lights& lights)
@@ -131,7 +132,7 @@ class SampleTimer {
                  [lanes](const GaussiansView& one, const GaussiansView& two) { return AllPairs(one, two, lanes); });
   }
 
-  /// Both forms are the same density, else the comparison is void.
+  /// Throws std::runtime_error unless both products give the same density.
   void check() const {
     for (std::size_t i = 0; i < 100; ++i) {
       const GaussiansView one = reflectances_[i % kHotRecords].gaussians.view(),
@@ -141,7 +142,9 @@ class SampleTimer {
       for (const int lanes : {4, 8}) {
         if (two.stride % lanes != 0) continue;
         const float ratio = AllPairs(one, two, lanes).pdf(y) / product.pdf(y);
-        if (!(std::abs(ratio - 1) < 1e-2f)) throw std::runtime_error(fmt::format("the forms differ by {}", ratio));
+        if (!(std::abs(ratio - 1) < 1e-2f))
+          throw std::runtime_error(
+              fmt::format("the densities of eager and lazy product differ by a factor of {}", ratio));
       }
     }
   }
@@ -170,8 +173,7 @@ class SampleTimer {
   volatile float sink_ = 0;
 };
 
-/// Rays of paths from the camera that bounce off whatever they meet, in an order in which no two that follow have to do
-/// with one another.
+/// Rays of diffuse camera paths in random order, so that consecutive rays are incoherent.
 std::vector<Ray> incoherentRays(const Scene& scene, const RayTracer& tracer) {
   constexpr int kBounces = 6;
   const RayCamera camera(scene.camera, scene.filter);
@@ -215,14 +217,14 @@ class RayTimer {
   volatile std::size_t hits_ = 0;
 };
 
-/// What is timed under one name.
+/// One measurement.
 struct Column {
   std::string name;
   std::function<double()> time;
   std::vector<double> nanoseconds{};
 };
 
-/// In turns, so that a machine that gets slower does so for all.
+/// Alternates between the measurements, so that a slowdown of the machine affects all of them.
 void timeInTurns(std::vector<Column>& columns, int rounds) {
   for (Column& c : columns) c.time();
   for (int i = 0; i < rounds; ++i)
@@ -257,7 +259,7 @@ void chooseTarget(const std::string& name) {
     if (kernelTargetName(target) == name) return useKernelTarget(target);
     known += " " + kernelTargetName(target);
   }
-  throw UsageError(fmt::format("--target: '{}' is none of{}", name, known));
+  throw UsageError(fmt::format("--target: '{}' is not available; choose one of{}", name, known));
 }
 
 void run(const Options& o) {
@@ -279,15 +281,16 @@ void run(const Options& o) {
 int main(int argc, char** argv) {
   Options options;
   return runTool(
-      "lobebench-product", "Times product samples with their densities; prints JSON, in nanoseconds of one thread.",
+      "lobebench-product", "Times product samples with their densities; prints JSON with nanoseconds on one thread.",
       argc, argv,
       [&](CLI::App& app) {
-        app.add_option("scene", options.scene, "Mitsuba scene file (XML) that rays are traced in")->required();
-        app.add_option("--rounds", options.rounds, "Times that everything is timed in turn")
+        app.add_option("scene", options.scene, "Mitsuba scene file (XML) in which rays are traced")->required();
+        app.add_option("--rounds", options.rounds, "Number of rounds in which everything is timed")
             ->check(CLI::PositiveNumber)
             ->capture_default_str();
-        app.add_option("--target", options.target, "SSE4, AVX2 or AVX3 (default: the best that the machine has)");
-        app.add_flag("--lenient", options.read.lenient, "Pass over what the reader does not know");
+        app.add_option("--target", options.target, "Instruction set: SSE4, AVX2 or AVX3 (default: the best available)");
+        app.add_flag("--lenient", options.read.lenient,
+                     "Replace or leave out faulty parts of the scene, with warnings");
         addDefinitions(app, options.read.definitions);
       },
       [&] { run(options); });

@@ -9,16 +9,20 @@ namespace lobe {
 
 void BenchTraining::declare(CLI::App& app) {
   app.add_option("scene", scene, "Mitsuba scene file (XML)")->required();
-  app.add_option("--width", width, "Of the picture, in pixels; its shape stays")
+  app.add_option("--width", width, "Width of the image in pixels; the aspect ratio is kept")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_option("--photons", plan.photons, "Photons a pass")->check(CLI::PositiveNumber)->capture_default_str();
-  app.add_option("--importons", plan.importons, "Importons a pass")->check(CLI::PositiveNumber)->capture_default_str();
-  app.add_option("--components", plan.records.components, "Gaussians of a record, 1 to 8")
+  app.add_option("--photons", plan.photons, "Number of photons per pass")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--importons", plan.importons, "Number of importons per pass")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--components", plan.records.components, "Gaussians per record, 1 to 8")
       ->check(CLI::Range(1, FieldOptions::kMostComponents))
       ->capture_default_str();
-  app.add_option("--seed", plan.seed, "Of the training")->capture_default_str();
-  app.add_flag("--lenient", read.lenient, "Pass over what the reader does not know");
+  app.add_option("--seed", plan.seed, "Random seed of the training")->capture_default_str();
+  app.add_flag("--lenient", read.lenient, "Replace or leave out faulty parts of the scene, with warnings");
   addDefinitions(app, read.definitions);
   addThreads(app, threads);
 }

@@ -1,6 +1,5 @@
 #pragma once
-// What the benchmarks of training and of its use have in common: a scene, how it is trained, and what their options are
-// called.
+// The scene, training plan and command-line options that the benchmarks of training share.
 
 #include <string>
 #include <vector>
@@ -14,13 +13,14 @@ namespace lobe {
 struct BenchTraining {
   std::string scene;
   ReadOptions read;
-  int width = 350;  ///< of the picture, in pixels
+  int width = 350;  ///< of the image, in pixels
   int threads = 0;  ///< 0: all cores
   TrainingPlan plan;
 
-  /// All but what records learn from and the number of passes, which each benchmark names itself.
+  /// Declares all options except those for the source of samples and the number of passes, which each benchmark
+  /// declares itself.
   void declare(CLI::App& app);
-  /// The scene with its picture made that wide, in its own shape.
+  /// The scene with its image resized to `width`, with the same aspect ratio.
   Scene readScene() const;
 };
 

@@ -1,5 +1,5 @@
-// lobebench-vertices: how well the densities that paths choose directions by fit what they are to integrate, at random
-// vertices of the camera's paths: the variance of one sample of ∫ f |cosθ| L dω, f the BSDF, by each density.
+// lobebench-vertices: the relative variance (NEV) of one sample of ∫ f |cosθ| L dω, f the BSDF, for each density from
+// which paths sample directions, at random vertices of camera paths.
 
 #include <algorithm>
 #include <array>
@@ -25,32 +25,32 @@ namespace {
 
 using namespace lobe;
 
-// Of vertices and the light they receive; not of training.
+// Seed of vertices and their incident radiance, different from that of training.
 constexpr std::uint64_t kVertexSeed = 1000003;
-constexpr int kPathsPerVertex = 100;  // until it is given up to find more
+constexpr int kPathsPerVertex = 100;  // upper bound of the paths traced to find a vertex
 
 struct Options : BenchTraining {
   std::string cacheFolder = "lobes";
   int vertices = 1000;
-  int directions = 1280;  ///< at each
-  int paths = 4;          ///< along each direction, twice
+  int directions = 1280;  ///< per vertex
+  int paths = 4;          ///< per estimate; each direction has two estimates
   std::vector<double> reductions{0.02f, 0.05f, 0.1f, 0.2f, 0.5f, 1, 2};
 };
 
-/// Samples as the sampler within does, and notes where.
-struct NotingSampler {
+/// Samples like the wrapped sampler and collects the vertices of the path.
+struct CollectingSampler {
   const GuidedSampler& within;
   std::vector<SurfaceHit>& vertices;
 
   class Vertex : public GuidedSampler::Vertex {
    public:
-    Vertex(const NotingSampler& sampler, const SurfaceHit& hit) : GuidedSampler::Vertex(sampler.within, hit) {
+    Vertex(const CollectingSampler& sampler, const SurfaceHit& hit) : GuidedSampler::Vertex(sampler.within, hit) {
       sampler.vertices.push_back(hit);
     }
   };
 };
 
-/// One vertex, any of them alike, from each of as many paths of the camera as it takes.
+/// Random vertices of camera paths: one from each path, chosen uniformly among its vertices.
 std::vector<SurfaceHit> verticesOfPaths(const RenderScene& scene, const RayCamera& camera, const GuidedSampler& sampler,
                                         int count) {
   std::vector<SurfaceHit> chosen;
@@ -62,15 +62,15 @@ std::vector<SurfaceHit> verticesOfPaths(const RenderScene& scene, const RayCamer
     const Ray ray = camera.sample(static_cast<int>(pixel.x() * static_cast<float>(camera.width())),
                                   static_cast<int>(pixel.y() * static_cast<float>(camera.height())), rng);
     std::vector<SurfaceHit> vertices;
-    const NotingSampler noting{sampler, vertices};
-    PathLoop(scene, options, noting).radiance(ray, rng, statistics);
+    const CollectingSampler collecting{sampler, vertices};
+    PathLoop(scene, options, collecting).radiance(ray, rng, statistics);
     if (vertices.empty()) continue;
     chosen.push_back(vertices[static_cast<std::size_t>(rng.uniform() * static_cast<float>(vertices.size()))]);
   }
   return chosen;
 }
 
-/// Mixtures of both factors, merged up to a cost.
+/// The mixtures of both factors, reduced with a threshold on the cost of merging.
 struct ReducedFactors {
   ReducedFactors(const Options& o, const Scene& scene, const Field& trained, double cost)
       : threshold(cost),
@@ -87,14 +87,14 @@ struct ReducedFactors {
   GuidedSampler sampler;
 };
 
-/// The records without the shares that they have learnt.
+/// The records without their learnt BSDF sampling fractions.
 Field withFixedFractions(const Field& field) {
   std::vector<IlluminationRecord> records = cacheOf(field).records();
   for (IlluminationRecord& r : records) r.bsdfFraction = kProductProbabilities.bsdf;
   return fieldOf({records, cacheOf(field).unit()});
 }
 
-/// All that vertices are examined with.
+/// Everything that is needed to grade vertices.
 struct Bench {
   const RenderScene& scene;
   const Integrator& paths;
@@ -104,8 +104,8 @@ struct Bench {
   const Options& options;
 };
 
-/// f |cosθ| L at a vertex, by directions from the BSDF, both guided densities, the environment, and uniform ones, as
-/// many of each, weighted as by one density (balance heuristic).
+/// Estimates f |cosθ| L at a vertex. Equal numbers of directions are sampled from the BSDF, both guided densities, the
+/// uniform density and the environment, and are combined with the balance heuristic.
 class DirectionSampler {
  public:
   DirectionSampler(const Bench& bench, const SurfaceHit& hit, std::uint64_t stream)
@@ -120,7 +120,7 @@ class DirectionSampler {
     each_ = bench_.options.directions / strategies / 2 * 2;
     for (int strategy = 0; strategy < strategies; ++strategy)
       for (int i = 0; i < each_; ++i)
-        if (const std::optional<Vec3> wi = draw(strategy)) look(*wi, i % 2 == 0);
+        if (const std::optional<Vec3> wi = draw(strategy)) addSample(*wi, i % 2 == 0);
     return IncidentRadiance(std::move(samples_));
   }
 
@@ -153,7 +153,7 @@ class DirectionSampler {
     return each_ * all;
   }
 
-  void look(const Vec3& local, bool firstHalf) {
+  void addSample(const Vec3& local, bool firstHalf) {
     const Vec3 world = hit_.frame.toWorld(local).normalized();
     if (!sidesAgree(hit_, world, local)) return;
     const Rgb f = evalBsdf(hit_, local) * std::abs(local.z());
@@ -183,7 +183,7 @@ class DirectionSampler {
   std::vector<IncidentRadiance::Sample> samples_;
 };
 
-/// Where a convex function of one number is least in [low, high], by golden section.
+/// The minimiser of a convex function in [low, high], by golden-section search.
 double leastAt(const std::function<double(double)>& function, double low, double high) {
   constexpr double golden = 0.6180339887498949;
   double left = high - golden * (high - low), right = low + golden * (high - low);
@@ -200,24 +200,24 @@ double leastAt(const std::function<double(double)>& function, double low, double
   return 0.5 * (low + high);
 }
 
-/// The densities of which the NEVs are reported, before those of reduced mixtures. The product's shares of the BSDF
-/// against the mixtures are those that its records have learnt, one for all records, or the best for each vertex: by
-/// Kullback–Leibler divergence, or by the NEV itself.
+/// The densities whose relative variances are reported, before those of reduced mixtures. For the product, the BSDF
+/// sampling fraction is the one that its records have learnt, a fixed one for all records, or the best one for each
+/// vertex, by Kullback–Leibler divergence or by relative variance.
 constexpr std::array kDensityNames{
     "bsdf", "guided", "product", "product_fixed_fractions", "product_fraction_by_kl", "product_fraction_by_nev"};
 
-/// What is found at one vertex.
+/// The results at one vertex.
 struct Grade {
   GuidingDecision decision = GuidingDecision::noRecord;
-  std::vector<double> nevs;  ///< kDensityNames, then each reduction; empty: no light was seen
-  double fraction = 1;       ///< of the BSDF in the product's density
-  double bestFraction = 1;   ///< by NEV
+  std::vector<double> nevs;  ///< of kDensityNames, then of each reduction; empty: no light was found
+  double fraction = 1;       ///< BSDF sampling fraction of the product's density
+  double bestFraction = 1;   ///< the fraction with the least relative variance
 };
 
-/// The product's density with other shares of BSDF and mixtures.
-class Reshared {
+/// The product's density with other BSDF sampling fractions.
+class ProductWithFraction {
  public:
-  Reshared(const GuidedSampler::Vertex& product, const SurfaceHit& hit, const IncidentRadiance& light)
+  ProductWithFraction(const GuidedSampler::Vertex& product, const SurfaceHit& hit, const IncidentRadiance& light)
       : product_(product), hit_(hit), light_(light) {}
 
   double pdf(const Vec3& wi, double fraction) const {
@@ -240,7 +240,7 @@ class Reshared {
   }
 
  private:
-  /// Some of the BSDF there has to be.
+  /// The fraction must not be 0, or the density could vanish where the BSDF does not.
   static double best(const std::function<double(double)>& loss) { return leastAt(loss, 0.02, 1); }
 
   const GuidedSampler::Vertex& product_;
@@ -264,10 +264,10 @@ Grade gradeVertex(const Bench& bench, const std::deque<ReducedFactors>& reductio
   if (!bsdf) return grade;
   grade.nevs = {*bsdf, *nev(bench.guided), *nev(bench.product), *nev(bench.fixedFractions)};
   if (grade.fraction < 1) {
-    const Reshared reshared(product, hit, light);
-    grade.bestFraction = reshared.fractionByNev();
-    grade.nevs.push_back(*reshared.nev(reshared.fractionByKl()));
-    grade.nevs.push_back(*reshared.nev(grade.bestFraction));
+    const ProductWithFraction withFraction(product, hit, light);
+    grade.bestFraction = withFraction.fractionByNev();
+    grade.nevs.push_back(*withFraction.nev(withFraction.fractionByKl()));
+    grade.nevs.push_back(*withFraction.nev(grade.bestFraction));
   } else {
     grade.nevs.insert(grade.nevs.end(), 2, grade.nevs[2]);
   }
@@ -286,7 +286,7 @@ std::vector<Grade> gradeAll(const Bench& bench, const std::deque<ReducedFactors>
   return grades;
 }
 
-/// Of the density of that place in Grade::nevs, over the vertices that see light.
+/// Statistics of the density with this index in Grade::nevs, over the vertices that receive light.
 nlohmann::ordered_json summary(const std::vector<Grade>& grades, std::size_t density) {
   std::vector<double> nevs;
   for (const Grade& g : grades)
@@ -346,19 +346,24 @@ void run(Options& o) {
 
 void declare(CLI::App& app, Options& o) {
   o.declare(app);
-  app.add_option("--cache", o.cacheFolder, "Folder of the caches that lobefit made")->capture_default_str();
-  app.add_option("--train", o.plan.from, "What records learn from")
+  app.add_option("--cache", o.cacheFolder, "Folder of the caches written by lobefit")->capture_default_str();
+  app.add_option("--train", o.plan.from, "Source of the training samples: photons, camera paths or both")
       ->transform(CLI::CheckedTransformer(trainFromNames()))
       ->default_str("both");
-  app.add_option("--passes", o.plan.passes, "Of training")->check(CLI::PositiveNumber)->capture_default_str();
-  app.add_option("--vertices", o.vertices, "Where to look")->check(CLI::PositiveNumber)->capture_default_str();
-  app.add_option("--directions", o.directions, "To look into from each vertex")
-      ->check(CLI::Range(16, 1 << 20))
-      ->capture_default_str();
-  app.add_option("--paths", o.paths, "Along each direction, twice: the more, the less is missed of what is rare")
+  app.add_option("--passes", o.plan.passes, "Number of training passes")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_option("--reductions", o.reductions, "Costs up to which to merge mixtures, separated by commas")
+  app.add_option("--vertices", o.vertices, "Number of path vertices to grade")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--directions", o.directions, "Number of sampled directions per vertex")
+      ->check(CLI::Range(16, 1 << 20))
+      ->capture_default_str();
+  app.add_option("--paths", o.paths,
+                 "Paths per estimate, with two estimates per direction; more paths find more of the rare light")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--reductions", o.reductions, "Thresholds on the cost of merging Gaussians, separated by commas")
       ->delimiter(',')
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
@@ -370,8 +375,8 @@ int main(int argc, char** argv) {
   Options options;
   return lobe::runTool(
       "lobebench-vertices",
-      "Trains a scene and grades the densities of directions at random vertices of its paths by the NEV of one sample "
-      "of BSDF times cosine times light; prints JSON. Light straight from an emitter counts with the share that "
-      "multiple importance sampling would leave to cosine-weighted directions.",
+      "Trains a scene and measures, at random vertices of camera paths, the relative variance (NEV) of one sample of "
+      "BSDF times cosine times incident radiance for several densities of directions; prints JSON. Light straight from "
+      "an emitter is weighted as multiple importance sampling weights cosine-weighted directions.",
       argc, argv, [&](CLI::App& app) { declare(app, options); }, [&] { run(options); });
 }

@@ -14,7 +14,8 @@ namespace lobe::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// One component of the reflectance with all of the light's: the moments of each product, by Cholesky factors.
+// Products of one component of the reflectance with components of the light, which start at `first` and fill a SIMD
+// register. The moments of the products are computed from Cholesky factors.
 template <class D>
 HWY_INLINE hn::Vec<D> formRow(D d, const GaussiansView& reflectance, int i, const GaussiansView& light, int first,
                               float* out) {
@@ -34,14 +35,14 @@ HWY_INLINE hn::Vec<D> formRow(D d, const GaussiansView& reflectance, int i, cons
   const auto inverse = hn::Div(hn::Set(d, 1.0f), determinant), inverseAcross = hn::Div(hn::Set(d, 1.0f), across);
   const auto dx = hn::Sub(two(GaussianField::x), one(GaussianField::x)),
              dy = hn::Sub(two(GaussianField::y), one(GaussianField::y));
-  const auto gap = hn::NegMulAdd(slope2, dx, dy);  // the light's ridge less the reflectance's mean, at its x
+  const auto gap = hn::NegMulAdd(slope2, dx, dy);  // the light's ridge minus the reflectance's mean, at its x
   const auto shift = hn::Mul(inverse, hn::MulAdd(hn::Mul(xx1, across), dx, hn::Mul(hn::Mul(wide, bend), gap)));
   const auto fraction = hn::Mul(d1, inverseAcross);
   const auto x = hn::Add(one(GaussianField::x), shift);
   const auto ridge1 = hn::MulAdd(slope1, shift, one(GaussianField::y));
   const auto ridge2 = hn::MulAdd(slope2, hn::Sub(x, two(GaussianField::x)), two(GaussianField::y));
   const auto xx = hn::Mul(wide, hn::Mul(across, inverse)), dd = hn::Mul(fraction, d2);
-  // The weight is the normal density of the difference of the means under the sum of the covariances.
+  // The weight is the Gaussian density of the difference of the means, with the sum of the covariances.
   const auto sxy = hn::MulAdd(slope1, xx1, hn::Mul(slope2, xx2));
   const auto lean = hn::NegMulAdd(hn::Div(sxy, sxx), dx, dy);
   const auto square = hn::Add(hn::Div(hn::Mul(dx, dx), sxx), hn::Mul(hn::Mul(lean, lean), hn::Mul(sxx, inverse)));

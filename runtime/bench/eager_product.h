@@ -1,6 +1,7 @@
 #pragma once
-// The product as Herholz et al. 2016 form it: mean, covariance and weight of every pair of components, and a density
-// that is the sum over all of them. What the lazy form is timed against. With kernels as ours, in lanes of 4 or 8.
+// The eager product of Herholz et al. 2016: mean, covariance and weight of every pair of components, and a density that
+// is the sum over all pairs. Baseline for the lazy product (runtime/mixture/product.h), with kernels of the same kind,
+// for 4 or 8 SIMD lanes.
 
 #include <array>
 
@@ -12,7 +13,7 @@ class AllPairs {
  public:
   static constexpr int kMostPairs = 64;
 
-  /// Factors as Product takes them, of at most kMostPairs pairs; the light's stride is a multiple of lanes (4 or 8).
+  /// Factors as for Product, with up to kMostPairs pairs; the stride of the light is a multiple of lanes (4 or 8).
   AllPairs(const GaussiansView& reflectance, const GaussiansView& light, int lanes);
 
   Vec2 sample(float choice, const Vec2& u) const;
@@ -22,7 +23,7 @@ class AllPairs {
   int lanes_;
   float mass_;
   int count_;
-  alignas(64) std::array<float, std::size_t{kGaussianFields} * kMostPairs> pairs_;  // as GaussiansView has them
+  alignas(64) std::array<float, std::size_t{kGaussianFields} * kMostPairs> pairs_;  // in the layout of GaussiansView
 };
 
 }  // namespace lobe

@@ -19,9 +19,9 @@ namespace {
   throw std::runtime_error(fmt::format("{}: cannot write: {}", path.string(), std::strerror(error)));
 }
 
-/// Where a chain of symbolic links ends, whether or not there is a file.
+/// The end of a chain of symbolic links, which need not exist.
 fs::path followLinks(fs::path path) {
-  constexpr int kMostLinks = 40;  // as many as Linux follows
+  constexpr int kMostLinks = 40;  // the limit of Linux
   std::error_code error;
   for (int i = 0; i < kMostLinks; ++i) {
     const fs::path next = fs::read_symlink(path, error);
@@ -31,8 +31,8 @@ fs::path followLinks(fs::path path) {
   refuse(path, ELOOP);
 }
 
-/// The file that writing to path means: links are followed, also to where there is no file yet, and only regular files
-/// are replaced, so that -o /dev/null does not replace the device.
+/// The file to replace: symbolic links are followed, including those to files that do not exist yet. Throws unless it
+/// is a regular file or absent, so that `-o /dev/null` does not replace the device.
 fs::path targetOf(const fs::path& path) {
   std::error_code error;
   fs::path target = followLinks(path);
@@ -43,7 +43,8 @@ fs::path targetOf(const fs::path& path) {
   return target;
 }
 
-/// Makes an empty file beside target, with the extension of target because writers choose the format by it.
+/// Creates an empty temporary file in the folder of target, with the same extension, from which writers may derive the
+/// format.
 fs::path createBeside(const fs::path& target, const fs::path& path) {
   static std::atomic<unsigned> counter = 0;
   for (;;) {
@@ -58,7 +59,7 @@ fs::path createBeside(const fs::path& target, const fs::path& path) {
   }
 }
 
-/// Waits until the bytes are on the disk: else a rename may survive a power failure that the content does not.
+/// Waits until the content is on the disk. Otherwise a power failure could preserve the rename but lose the content.
 void flushToDisk(const fs::path& temporary, const fs::path& path) {
   const int file = ::open(temporary.c_str(), O_RDONLY | O_CLOEXEC);
   if (file < 0) refuse(path, errno);

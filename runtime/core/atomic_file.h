@@ -1,5 +1,5 @@
 #pragma once
-// Output files appear whole or not at all: written beside their place, then renamed.
+// Atomic writing of output files: a temporary file in the same folder is written completely, then renamed.
 
 #include <filesystem>
 #include <functional>
@@ -8,15 +8,17 @@
 
 namespace lobe {
 
-/// Calls write with a temporary path in path's folder and renames it to path when write returns; removes it when write
-/// throws. The folder is not created. Throws std::runtime_error that names path.
+/// Calls `write` with the path of a temporary file in the folder of `path`, and renames the file to `path` when `write`
+/// returns. If `write` throws, the temporary file is removed and the exception is passed on. The folder must exist.
+/// Throws std::runtime_error that names `path` if the file cannot be written.
 void writeAtomically(const std::filesystem::path& path, const std::function<void(const std::filesystem::path&)>& write);
 
-/// The same for bytes in memory.
+/// Writes bytes or text atomically.
 void writeAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void writeAtomically(const std::filesystem::path& path, const std::string& text);
 
-/// Throws, as writeAtomically would, when path cannot be written; leaves nothing behind. For before hours of work.
+/// Throws like writeAtomically if `path` cannot be written, and creates no file. Call it before a long computation
+/// whose result is written to `path`.
 void checkWritable(const std::filesystem::path& path);
 
 }  // namespace lobe

@@ -1,5 +1,5 @@
 #pragma once
-// Colour spaces: CIE XYZ, linear Rec. 709, and the transfer function of sRGB (IEC 61966-2-1).
+// Conversions between CIE XYZ, linear Rec. 709 RGB and sRGB (transfer function of IEC 61966-2-1).
 
 #include <cmath>
 
@@ -9,14 +9,14 @@
 
 namespace lobe {
 
-/// Linear Rec. 709 of a CIE XYZ triple. Negative components, which are outside the gamut, become zero.
+/// Converts CIE XYZ to linear Rec. 709 RGB. Colours outside the gamut have negative components, which become zero.
 inline Rgb rgbOfXyz(const Eigen::Vector3d& xyz) {
   const Eigen::Matrix3d toRgb{
       {3.240479, -1.537150, -0.498535}, {-0.969256, 1.875991, 0.041556}, {0.055648, -0.204043, 1.057311}};
   return (toRgb * xyz).cast<float>().array().max(0.0f);
 }
 
-/// The linear value of an sRGB-encoded one. Values outside [0, 1] are extrapolated.
+/// Decodes an sRGB-encoded value to a linear one. Values outside [0, 1] are extrapolated.
 inline float decodeSrgb(float encoded) {
   return encoded <= 0.04045f ? encoded / 12.92f : std::pow((encoded + 0.055f) / 1.055f, 2.4f);
 }
@@ -24,7 +24,7 @@ inline Rgb decodeSrgb(const Rgb& encoded) {
   return encoded.unaryExpr([](float x) { return decodeSrgb(x); });
 }
 
-/// The sRGB encoding of a linear value, in [0, 1]. Values outside [0, 1] are clamped; NaN gives 0.
+/// Encodes a linear value as sRGB. Values are clamped to [0, 1]; NaN gives 0.
 inline float encodeSrgb(float linear) {
   if (!(linear > 0.0f)) return 0.0f;
   const float c = std::min(linear, 1.0f);

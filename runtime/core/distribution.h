@@ -1,5 +1,5 @@
 #pragma once
-// Discrete and piecewise-constant distributions in one and two dimensions.
+// A discrete distribution, sampled by inversion of its cumulative distribution.
 
 #include <algorithm>
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace lobe {
 
-/// Indices in proportion to non-negative weights.
+/// A distribution of indices with probabilities proportional to non-negative weights.
 class DiscreteDistribution {
  public:
   DiscreteDistribution() = default;
@@ -27,12 +27,13 @@ class DiscreteDistribution {
   }
 
   std::size_t size() const { return cumulative_.size(); }
-  /// Sum of the weights. 0: nothing may be sampled.
+  /// Sum of the weights. If it is 0, sample and probability must not be called.
   double total() const { return total_; }
   double weight(std::size_t i) const { return cumulative_[i] - (i > 0 ? cumulative_[i - 1] : 0.0); }
   float probability(std::size_t i) const { return static_cast<float>(weight(i) / total_); }
 
-  /// An index for u uniform in [0,1), which is made uniform again. Not for a total of 0.
+  /// Samples an index with u uniform in [0,1), and rescales u to be uniform in [0,1) again. Requires total() > 0. Takes
+  /// constant time on average.
   std::size_t sample(float& u) const {
     const double target = u * total_;
     std::size_t i = guide_[std::min(static_cast<std::size_t>(u * static_cast<double>(size())), size() - 1)];
@@ -40,8 +41,8 @@ class DiscreteDistribution {
     return finish(i, size(), target, u);
   }
 
-  /// Only indices in [first, last), of which the weights have a positive sum; probabilities are relative to mass(first,
-  /// last).
+  /// Samples an index in [first, last) in the same way; probabilities are relative to mass(first, last), which must be
+  /// positive. Takes logarithmic time.
   std::size_t sample(float& u, std::size_t first, std::size_t last) const {
     if (first == 0 && last == size()) return sample(u);
     const double low = first > 0 ? cumulative_[first - 1] : 0.0;
@@ -51,13 +52,14 @@ class DiscreteDistribution {
     return finish(static_cast<std::size_t>(found - begin), last, target, u);
   }
 
+  /// Sum of the weights in [first, last).
   double mass(std::size_t first, std::size_t last) const {
     return last > first ? cumulative_[last - 1] - (first > 0 ? cumulative_[first - 1] : 0.0) : 0.0;
   }
 
  private:
-  // What is left of u within the index found. Rounding may have pushed the target onto the end: the last index that has
-  // a weight is meant then.
+  // Rescales u to the position of the target within the weight of index i. If rounding has placed the target at the end
+  // of the range, the last index with positive weight is used.
   std::size_t finish(std::size_t i, std::size_t last, double target, float& u) const {
     i = std::min(i, last - 1);
     while (i > 0 && !(cumulative_[i] > cumulative_[i - 1])) --i;
@@ -67,7 +69,7 @@ class DiscreteDistribution {
   }
 
   std::vector<double> cumulative_;
-  std::vector<std::uint32_t> guide_;  // for each of size() equal parts of [0, total), where to start looking
+  std::vector<std::uint32_t> guide_;  // first index to search for each of size() equal parts of [0, total)
   double total_ = 0;
 };
 

@@ -14,14 +14,14 @@
 
 namespace lobe {
 
-/// Opens a regular file for reading bytes. Throws std::runtime_error with the reason but without the file's name, which
-/// nameErrors adds.
+/// Opens a regular file for binary reading. Throws std::runtime_error with the reason, but without the name of the
+/// file, which nameErrors adds.
 std::ifstream openFile(const std::filesystem::path& path);
 
-/// The content of a regular file. Throws as openFile.
+/// The content of a regular file. Throws like openFile.
 std::string readFile(const std::filesystem::path& path);
 
-/// Returns what read() returns. Exceptions become std::runtime_error whose message begins with the file's name.
+/// Returns the result of read(). Exceptions are converted to std::runtime_error with the name of the file prepended.
 template <class Read>
 auto nameErrors(const std::filesystem::path& path, Read&& read) {
   try {

@@ -1,6 +1,5 @@
 #pragma once
-// A 64-bit hash (XXH3) of values put in one after the other: equal values in equal order give equal fingerprints, on
-// every run.
+// A 64-bit hash (XXH3) of a sequence of values. Equal sequences give equal fingerprints in all runs of the program.
 
 #include <concepts>
 #include <cstdint>
@@ -22,26 +21,27 @@ class Fingerprint {
 
   void bytes(std::span<const std::byte> data);
 
-  /// Its length and its characters, so that two texts are never mistaken for others that join to the same.
+  /// Adds length and characters, so that different sequences of texts with equal concatenation differ.
   void text(std::string_view value);
 
   template <class Number>
   requires std::is_arithmetic_v<Number> || std::is_enum_v<Number>
   void number(Number value) { bytes(std::as_bytes(std::span(&value, 1))); }
 
-  /// The coefficients of a vector, matrix or colour of fixed size.
+  /// Adds the coefficients of a fixed-size vector, matrix or colour.
   template <class Fixed>
   void coefficients(const Fixed& value) {
     bytes(std::as_bytes(std::span(value.data(), static_cast<std::size_t>(value.size()))));
   }
 
-  /// How many there are and what they are, for elements without padding.
+  /// Adds the number of elements and their bytes. Element must not contain padding bytes.
   template <class Element>
   void array(std::span<const Element> elements) {
     number(elements.size());
     bytes(std::as_bytes(elements));
   }
 
+  /// The hash of all values added so far.
   std::uint64_t value() const;
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-// An orthonormal shading frame: local z is the normal, local x the tangent (direction of alphaU), y the bitangent.
+// An orthonormal shading frame: the local z axis is the normal, x the tangent (direction of alphaU), y the bitangent.
 
 #include <cmath>
 
@@ -17,7 +17,7 @@ struct Frame {
   Frame() = default;
   Frame(const Vec3& tangent, const Vec3& bitangent, const Vec3& normal) : s(tangent), t(bitangent), n(normal) {}
 
-  /// A frame about the unit vector n, continuous except where n.z changes sign (Duff et al. 2017, JCGT 6(1)).
+  /// A frame whose z axis is the unit vector n, continuous except where n.z changes sign (Duff et al. 2017, JCGT 6(1)).
   static Frame fromNormal(const Vec3& n) {
     const float sign = std::copysign(1.0f, n.z());
     const float a = -1.0f / (sign + n.z());
@@ -26,7 +26,8 @@ struct Frame {
             n};
   }
 
-  /// A frame about the unit normal n whose x axis is dpdu made orthogonal to n; fromNormal(n) where dpdu is degenerate.
+  /// A frame whose z axis is the unit normal n and whose x axis is dpdu made orthogonal to n; fromNormal(n) if dpdu is
+  /// zero or nearly parallel to n.
   static Frame fromTangent(const Vec3& n, const Vec3& dpdu) {
     const Vec3 s = dpdu - n * n.dot(dpdu);
     const float length = s.norm();

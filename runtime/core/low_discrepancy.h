@@ -1,6 +1,7 @@
 #pragma once
-// Points that fill the unit square and cube evenly: additive recurrences on the roots of x^(d+1) = x + 1 (Roberts
-// 2018). Any run of consecutive indices is even, so runs that follow each other serve as fresh points.
+// Low-discrepancy sequences in the unit square and cube: additive recurrences with the roots of x^(d+1) = x + 1
+// (Roberts 2018). Every range of consecutive indices has low discrepancy, so that disjoint ranges can serve as separate
+// point sets.
 
 #include <algorithm>
 #include <cmath>
@@ -9,6 +10,7 @@
 
 namespace lobe {
 
+/// Coordinate number `index` of the recurrence with the given step, in [0, 1).
 inline float recurrencePoint(double step, long index) {
   const double x = 0.5 + step * static_cast<double>(index);
   return std::min(static_cast<float>(x - std::floor(x)), 0x1.fffffep-1f);

@@ -1,5 +1,5 @@
 #pragma once
-// Decimal numbers in text files.
+// Parsing of decimal numbers in text.
 
 #include <optional>
 #include <string_view>
@@ -7,18 +7,18 @@
 
 namespace lobe {
 
-/// The text without blanks (space, tab, CR, LF) at its ends.
+/// The text without leading and trailing white space (space, tab, CR, LF).
 std::string_view trimmed(std::string_view text);
 
-/// One decimal number that fills the whole word; a leading plus is allowed. Values too small for a double become zero
-/// and values too large infinite. nullopt for anything else.
+/// Parses a word that consists of one decimal number; a leading plus sign is allowed. Values too small for a double
+/// become zero, and values too large become infinite. nullopt if the word is not a number.
 std::optional<double> parseReal(std::string_view word);
 
-/// A finite number with optional blanks around it.
+/// Parses a finite number, or an integer in the range of int, with optional white space around it.
 std::optional<double> parseNumber(std::string_view text);
 std::optional<int> parseInteger(std::string_view text);
 
-/// Finite numbers separated by blanks or commas; nullopt when anything else is between them.
+/// Parses finite numbers separated by white space or commas; nullopt if the text contains anything else.
 std::optional<std::vector<double>> parseNumbers(std::string_view text);
 
 }  // namespace lobe

@@ -1,5 +1,5 @@
 #pragma once
-// Parallel loops whose results may be used when they return.
+// Parallel loops that either complete or throw.
 
 #include <stdexcept>
 
@@ -8,15 +8,16 @@
 
 namespace lobe {
 
-/// A loop was cancelled because an enclosing parallel loop or task failed: some of its iterations did not run.
+/// Thrown when a loop is cancelled because an enclosing parallel loop or task failed, so that some iterations did not
+/// run.
 class LoopCancelled : public std::runtime_error {
  public:
   LoopCancelled() : std::runtime_error("cancelled by the failure of a parallel task") {}
 };
 
-/// Calls body(i) for every i in [begin, end), in parallel. Throws what an iteration throws. tbb::parallel_for alone
-/// returns normally when an exception elsewhere in an enclosing loop cancels it, although some iterations never ran;
-/// this throws LoopCancelled instead, so that nobody takes a part of the results for all of them.
+/// Calls body(i) for every i in [begin, end) in parallel. Rethrows the exception of an iteration. If an exception in an
+/// enclosing loop cancels this one, tbb::parallel_for returns normally although some iterations did not run; this
+/// function throws LoopCancelled instead, so that incomplete results are never used.
 template <class Index, class Body>
 void parallelFor(Index begin, Index end, const Body& body) {
   tbb::task_group_context context;  // bound to the enclosing loop, if there is one, and cancelled with it

@@ -1,6 +1,6 @@
 #pragma once
-// Precompiled for all targets but the kernels, whose flags differ: parsing these took half of the build's time. Sources
-// include what they use all the same.
+// The precompiled header of all targets except the SIMD kernels, which have different flags. Parsing these headers took
+// half of the build time. Sources still include the headers that they use.
 
 #include <algorithm>
 #include <array>

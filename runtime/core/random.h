@@ -1,6 +1,6 @@
 #pragma once
-// A small random number generator whose streams are cheap to start: one per pixel sample, particle or record, so that
-// results do not depend on which thread does what.
+// A small random number generator whose streams are cheap to create. Each pixel sample, particle or record uses a
+// stream of its own, so that results do not depend on the assignment of work to threads.
 
 #include <cstdint>
 
@@ -11,7 +11,7 @@ namespace lobe {
 /// PCG32 (O'Neill 2014), seeded by hashing.
 class Rng {
  public:
-  /// Streams of different (seed, stream, index) are independent for all practical purposes.
+  /// Different triples (seed, stream, index) give streams that are independent for practical purposes.
   explicit Rng(std::uint64_t seed, std::uint64_t stream = 0, std::uint64_t index = 0)
       : state_(mix(seed + 0x9e3779b97f4a7c15ull * (index + 1))), increment_((mix(stream ^ state_) << 1) | 1) {
     next();
@@ -33,7 +33,7 @@ class Rng {
   }
 
  private:
-  // The finaliser of SplitMix64 (Steele et al. 2014).
+  // The finalizer of SplitMix64 (Steele et al. 2014).
   static std::uint64_t mix(std::uint64_t z) {
     z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
     z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;

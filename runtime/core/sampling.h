@@ -1,5 +1,5 @@
 #pragma once
-// Maps from uniform random numbers to directions, with their densities over solid angle.
+// Maps from uniform random numbers to points and directions, with their densities over solid angle.
 
 #include <cmath>
 #include <numbers>
@@ -10,17 +10,17 @@ namespace lobe {
 
 inline constexpr float kPi = std::numbers::pi_v<float>;
 inline constexpr float kInvPi = std::numbers::inv_pi_v<float>;
-/// The largest float below one: uniform numbers live in [0, 1).
+/// The largest float below one, the upper bound of uniform random numbers in [0, 1).
 inline constexpr float kOneMinusEpsilon = 0x1.fffffep-1f;
 
-/// u uniform in [0,1)² to a point uniform in the unit disc.
+/// Maps u uniform in [0,1)² to a uniformly distributed point of the unit disc.
 inline Vec2 squareToDisk(const Vec2& u) {
   const float r = std::sqrt(u.x());
   const float phi = 2.0f * kPi * u.y();
   return {r * std::cos(phi), r * std::sin(phi)};
 }
 
-/// u uniform in [0,1)² to a direction of density cosθ/π over the upper hemisphere.
+/// Maps u uniform in [0,1)² to a direction with density cosθ/π over the upper hemisphere.
 inline Vec3 squareToCosineHemisphere(const Vec2& u) {
   const Vec2 d = squareToDisk(u);
   return {d.x(), d.y(), std::sqrt(std::max(0.0f, 1.0f - d.squaredNorm()))};
@@ -29,7 +29,7 @@ inline float cosineHemispherePdf(const Vec3& w) {
   return std::max(0.0f, w.z()) * kInvPi;
 }
 
-/// u uniform in [0,1)² to a direction of density 1/(4π).
+/// Maps u uniform in [0,1)² to a uniformly distributed direction of the sphere (density 1/(4π)).
 inline Vec3 squareToSphere(const Vec2& u) {
   const float z = 1.0f - 2.0f * u.x();
   const float r = std::sqrt(std::max(0.0f, 1.0f - z * z));

@@ -8,7 +8,7 @@
 
 namespace lobe {
 
-/// The q-quantile, q in [0, 1], interpolated linearly between the two nearest values. NaN without values.
+/// The q-quantile, q in [0, 1], interpolated linearly between the two nearest values. NaN if there are no values.
 inline double quantile(std::vector<double> values, double q) {
   if (values.empty()) return NAN;
   std::ranges::sort(values);

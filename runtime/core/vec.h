@@ -1,5 +1,5 @@
 #pragma once
-// The vector vocabulary of the renderer: Eigen's types under short names.
+// Short names for Eigen's vector types, and colours.
 
 #include <Eigen/Core>
 
@@ -7,7 +7,7 @@ namespace lobe {
 
 using Vec2 = Eigen::Vector2f;
 using Vec3 = Eigen::Vector3f;
-/// A linear radiometric triple (Rec. 709 primaries). An array, so that products are by component.
+/// Linear RGB with Rec. 709 primaries. An Eigen array, so that products are componentwise.
 using Rgb = Eigen::Array3f;
 
 inline float luminance(const Rgb& c) {

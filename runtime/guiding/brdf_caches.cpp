@@ -15,14 +15,14 @@
 namespace lobe {
 namespace {
 
-// A cache's components are read in place as Gaussians.
+// The components of a cache file are used in place as Gaussians.
 static_assert(sizeof(CacheComponent) == sizeof(Gaussian) && alignof(CacheComponent) == alignof(Gaussian));
 
 std::span<const Gaussian> asGaussians(std::span<const CacheComponent> components) {
   return {reinterpret_cast<const Gaussian*>(components.data()), components.size()};
 }
 
-/// Opens the file of a lobe, or says why it cannot serve.
+/// Opens the file of a lobe; throws std::runtime_error if it is missing, damaged or stale.
 LobeCache openFor(const std::filesystem::path& folder, const LobeRequest& request) {
   const std::filesystem::path path = folder / lobeFileName(request.model, request.key);
   if (!std::filesystem::exists(path)) throw std::runtime_error(path.string() + ": missing");
@@ -47,7 +47,7 @@ BrdfCaches::Entry::Entry(LobeCache opened, float reduction)
     lanes.resize(lanes.size() + static_cast<std::size_t>(stride) * kGaussianFields);
     packGaussians(mixture, lanes.data() + records.back().first, stride);
   }
-  lanes.resize(lanes.size() + kMaxVectorLanes);  // kernels read whole sets of lanes
+  lanes.resize(lanes.size() + kMaxVectorLanes);  // padding lanes: kernels read whole SIMD vectors
   if (grid.kind == GridKind::elevation) findSteps();
 }
 
@@ -71,7 +71,7 @@ const BrdfCaches::Record& BrdfCaches::Entry::nearest(const Vec3& wo) const {
 BrdfCaches::BrdfCaches(const std::filesystem::path& folder, std::span<const LobeRequest> requests,
                        const std::string& remedy, float reduction) {
   std::map<std::string, int> known;
-  std::map<std::string, std::vector<std::string>> faults;  // by message, the materials
+  std::map<std::string, std::vector<std::string>> faults;  // message -> materials
   for (const LobeRequest& request : requests) {
     auto [entry, added] = known.try_emplace(request.key, static_cast<int>(caches_.size()));
     cacheOfRequest_.push_back(entry->second);
@@ -80,7 +80,7 @@ BrdfCaches::BrdfCaches(const std::filesystem::path& folder, std::span<const Lobe
       caches_.emplace_back(openFor(folder, request), reduction);
     } catch (const std::runtime_error& e) {
       faults[e.what()].push_back(request.material);
-      known.erase(entry);  // so that the next material of the same lobe is named, too
+      known.erase(entry);  // so that other materials with the same lobe are listed as well
     }
   }
   if (faults.empty()) return;
@@ -100,11 +100,11 @@ void BrdfCaches::add(int lobe, const Vec3& wo, const Vec2& turn, float tint, Ref
   if (!representable) return;
 
   Placement placement = placementOf({entry.grid.kind, record.reference, mirror}, wo);
-  // Turned once more, by the sum of both angles.
+  // Compose with the rotation by `turn`: the angles add up.
   const float cosine = placement.cosine, sine = placement.sine;
   placement.cosine = turn.x() * cosine - turn.y() * sine;
   placement.sine = turn.y() * cosine + turn.x() * sine;
-  // ρ = integral · G / 2, because dω = 2 dA, with G normalised over the disc: records are over the plane.
+  // ρ = integral · G / 2 because dω = 2 dA. G is normalised over the whole plane; Record::integral accounts for that.
   placement.factor = 0.5f * tint * record.integral;
   auto& gaussians = reflectance.gaussians;
   placeMixture(record.view(entry.lanes), placement, gaussians.data(), gaussians.kStride, gaussians.count());

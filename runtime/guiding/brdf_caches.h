@@ -1,5 +1,5 @@
 #pragma once
-// The BRDF caches of a scene, opened once and looked up at every vertex.
+// The BRDF caches of a scene: opened once, then looked up at every path vertex. This is the content of LobeCacheSet.
 
 #include <cstdint>
 #include <filesystem>
@@ -17,47 +17,46 @@ namespace lobe {
 
 class BrdfCaches {
  public:
-  /// Opens the file of every request in the folder; equal keys share one. Throws std::runtime_error with one line that
-  /// names all materials whose cache is missing, stale or damaged, and `remedy`, the command that makes them.
-  /// Mixtures are merged by `reduce` at the threshold `reduction` of cost; 0 leaves them.
+  /// See LobeCacheSet.
   BrdfCaches(const std::filesystem::path& folder, std::span<const LobeRequest> requests, const std::string& remedy,
              float reduction = 0);
 
-  /// Adds tint · ρ_lobe at wo to a reflectance. lobe: index of the request. wo: unit, z > 0, in the shading frame.
-  /// turn: (cos, sin) of the angle by which the reflectance's frame sees shading-frame vectors turned about the normal.
-  /// A lobe without components, or whose components do not fit any more, is left to the BSDF's sampler.
+  /// Adds tint · ρ_lobe(wo, ·) to a reflectance. lobe: index of the request. wo: unit, z > 0, in the shading frame.
+  /// turn: (cos, sin) of the rotation that maps shading-frame coordinates to the frame of the reflectance. A lobe whose
+  /// record has no components, or for whose components there is no room, is counted in unrepresentableAlbedo instead.
   void add(int lobe, const Vec3& wo, const Vec2& turn, float tint, Reflectance& reflectance) const;
 
   std::size_t files() const { return caches_.size(); }
   std::size_t bytes() const;
-  double meanComponents() const;  ///< of a record; 0 without records
-  /// Content hashes of the files, in order of first use.
+  double meanComponents() const;  ///< per record; 0 if there are no records
+  /// Content hashes of the files, in the order in which the requests first use them.
   std::vector<std::uint64_t> hashes() const;
 
  private:
-  /// A record as it is looked up.
+  /// A record in memory.
   struct Record {
-    Vec2 reference;     ///< the direction that it was fitted for, on the disc
-    std::size_t first;  ///< of its lanes
+    Vec2 reference;     ///< the direction wo that it was fitted for, on the disc
+    std::size_t first;  ///< index of its first float in Entry::lanes
     int stride, count;
-    float integral;  ///< over the plane: what the components' weights are to be multiplied by for ∫ ρ dω
+    float integral;  ///< factor of the normalised mixture: ∫ ρ dω divided by the mass of the mixture inside the disc
     float albedo, cosineMass;
 
-    /// The view of its components.
+    /// Its components, given Entry::lanes.
     GaussiansView view(const std::vector<float>& lanes) const { return {lanes.data() + first, stride, count}; }
   };
   class Entry {
    public:
     Entry(LobeCache opened, float reduction);
-    /// The record of the grid's direction nearest to wo, which is mirrored where the grid is of a quarter.
+    /// The record for the grid direction nearest to wo. wo must be mirrored first if the grid covers only a quarter of
+    /// the directions.
     const Record& nearest(const Vec3& wo) const;
 
     LobeCache cache;
     DirectionGrid grid;
     std::vector<Record> records;
-    std::vector<float> lanes;  ///< of all records
-    /// Of grids of elevations: the cosines, falling, where the next of recordOfStep serves. They are few, so that to
-    /// count those above a cosine takes less time than DirectionGrid::nearest.
+    std::vector<float> lanes;  ///< the Gaussians of all records (SoA)
+    /// For elevation grids only: the decreasing cosines at which the look-up moves on to the next of recordOfStep.
+    /// There are few of them, so that counting those above a cosine is faster than DirectionGrid::nearest.
     std::vector<float> steps;
     std::vector<std::uint32_t> recordOfStep;
 

@@ -6,8 +6,9 @@
 namespace lobe {
 namespace {
 
-// Not critical: with 3, or with earlier passes counted half, errors of pictures are the same within their noise.
-constexpr double kPriorEvidence = 10;  // effective samples that speak for the share all records begin with
+// The weight of the initial fraction, in effective samples. Its value is not critical: with 3, or with earlier passes
+// counted half, the errors of images are the same within their noise.
+constexpr double kPriorEvidence = 10;
 constexpr int kSweeps = 60;
 
 bool counts(const FractionSample& s) {
@@ -15,7 +16,7 @@ bool counts(const FractionSample& s) {
          s.bsdf + s.mixtures > 0;
 }
 
-/// What weights have to be multiplied by to sum to the effective number of samples, (Σw)²/Σw²; 0 without any.
+/// The factor that makes the weights sum to the effective number of samples, (Σw)²/Σw²; 0 if no sample counts.
 double toEffectiveSamples(std::span<const FractionSample> samples) {
   double sum = 0, squares = 0;
   for (const FractionSample& s : samples) {

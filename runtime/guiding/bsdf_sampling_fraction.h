@@ -1,8 +1,8 @@
 #pragma once
-// How often a record leaves the choice of a direction to the BSDF, learnt from what camera paths found: the share α
-// that brings α b + (1−α) m nearest to f L cosθ by Kullback–Leibler divergence, with b the BSDF's density and m that of
-// the mixtures. Müller 2019 ("Practical Path Guiding" in Production) descends the gradient in α; α is a weight of a
-// mixture, for which EM needs no step size.
+// The BSDF sampling fraction of an illumination record, learnt from samples of camera paths: the probability α of BSDF
+// sampling that minimises the Kullback–Leibler divergence of α b + (1−α) m from f L cosθ, where b is the density of the
+// BSDF's sampler and m that of the mixtures. Müller 2019 ("Practical Path Guiding" in Production) uses gradient
+// descent; here α is optimised as a mixture weight by EM, which needs no step size.
 
 #include <span>
 
@@ -10,29 +10,29 @@
 
 namespace lobe {
 
-/// Of the BSDF at least, so that what a bad mixture does is bounded.
+/// Lower bound of the fraction, which bounds the sample weights where a mixture fits badly.
 inline constexpr float kMinBsdfFraction = 0.05f;
 
-/// One direction that a path took at a vertex. Densities over solid angle.
+/// A direction sampled at a path vertex. Densities are over solid angle.
 struct FractionSample {
-  std::size_t record;   ///< that served the vertex: its index in the cache
-  float bsdf;           ///< the BSDF's density of the direction
-  float mixtures;       ///< that of product and illumination, in the ratio of kProductProbabilities
-  float representable;  ///< share of samples that BSDF and mixtures divide; the others are the BSDF's; in (0,1]
-  float weight = 0;     ///< f L cosθ over the density that it was drawn by, luminance
+  std::size_t record;   ///< index in the cache of the record that serves the vertex
+  float bsdf;           ///< density of the BSDF's sampler
+  float mixtures;       ///< density of product and illumination together, in the ratio of kProductProbabilities
+  float representable;  ///< fraction of samples to which α applies, in (0,1]; the others always use the BSDF
+  float weight = 0;     ///< f L cosθ (luminance) divided by the density that the direction was sampled with
 };
 
 class BsdfSamplingFraction {
  public:
-  /// Adds the samples of a pass to what was learnt before. Those whose weight or densities are not positive and finite
-  /// are ignored; scaling all weights of a pass changes nothing.
+  /// Updates the fraction with the samples of a pass. Samples whose weight is not positive, or whose weight or
+  /// densities are not finite, are ignored. The result is invariant to scaling all weights of a pass.
   void learn(std::span<const FractionSample> samples);
 
-  /// In [kMinBsdfFraction, 1 − kMinBsdfFraction]; kProductProbabilities.bsdf before anything was learnt.
+  /// The fraction, in [kMinBsdfFraction, 1 − kMinBsdfFraction]; kProductProbabilities.bsdf before the first update.
   float bsdf() const { return bsdf_; }
 
  private:
-  double bsdfEvidence_ = 0, evidence_ = 0;  // in effective samples: the BSDF's, and both
+  double bsdfEvidence_ = 0, evidence_ = 0;  // effective samples: attributed to the BSDF, and in total
   float bsdf_ = kProductProbabilities.bsdf;
 };
 

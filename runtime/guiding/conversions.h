@@ -1,5 +1,5 @@
 #pragma once
-// Between the public vector types and Eigen's.
+// Conversions between the public vector types and Eigen's.
 
 #include <Eigen/Core>
 

@@ -23,11 +23,12 @@ TrainingOptions trainingOptions(const FieldOptions& options) {
 }
 
 IlluminationTrainer& trainerOf(FieldData& data) {
-  if (!data.trainer) throw std::logic_error("a field that was loaded from a file cannot be trained further");
+  if (!data.trainer)
+    throw std::logic_error("a field that was loaded, frozen, reduced or default-constructed cannot be trained");
   return *data.trainer;
 }
 
-/// Calls use with the content in the order of its paths.
+/// Calls `use` with the content sorted by path index.
 template <class Use>
 auto inOrder(const SampleStorageData& data, const Use& use) {
   return data.isInOrder() ? use(data) : use(data.inOrder());
@@ -37,7 +38,8 @@ auto inOrder(const SampleStorageData& data, const Use& use) {
 
 void FieldOptions::validate() const {
   static_assert(kMostComponents == kMaxLightComponents);
-  if (!(sceneDiagonal > 0)) throw std::runtime_error(fmt::format("sceneDiagonal: over 0, not {}", sceneDiagonal));
+  if (!(sceneDiagonal > 0))
+    throw std::runtime_error(fmt::format("training option sceneDiagonal must be positive, not {}", sceneDiagonal));
   trainingOptions(*this).validate();
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// The content of a Field, for the parts of the library and the tools that look inside.
+// The content of a Field, for internal use by the library and its tools.
 
 #include <optional>
 
@@ -10,15 +10,15 @@
 namespace lobe {
 
 struct FieldData {
-  std::optional<IlluminationTrainer> trainer;  ///< nullopt: frozen, and
-  IlluminationCache frozen;
+  std::optional<IlluminationTrainer> trainer;  ///< nullopt if the field cannot be trained
+  IlluminationCache frozen;                    ///< the records if there is no trainer
 
   const IlluminationCache& cache() const { return trainer ? trainer->cache() : frozen; }
 };
 
 /// The records of a field.
 const IlluminationCache& cacheOf(const Field& field);
-/// A field of these records, not to be trained.
+/// A field with these records that cannot be trained.
 Field fieldOf(IlluminationCache cache);
 
 }  // namespace lobe

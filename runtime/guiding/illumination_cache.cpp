@@ -10,15 +10,15 @@ namespace lobe {
 namespace {
 
 constexpr float kMinNormalCosine = 0.97f;  // about 14°
-// Cells of the largest radius: a record lies in few of them, and a cell holds few records.
+// A cell is twice as large as the largest radius, so that a record overlaps few cells and a cell holds few records.
 constexpr float kCellsPerUnit = 0.5f;
-constexpr float kRounding = 1e-3f;  // of a cell: a point may be found in the cell next to its own
+constexpr float kRounding = 1e-3f;  // in cells: rounding may place a point into the cell next to its own
 
 Eigen::Vector3i cellOf(const Vec3& x, float inverseCellSize) {
   return (x * inverseCellSize).array().floor().cast<int>();
 }
 
-/// Cells hold what faces one side each: that of the cube of directions which the normal points at.
+/// Every cell holds records of one side only: the face of the direction cube that their normal points at.
 enum Side : std::uint8_t { kSides = 6 };
 
 Side sideOf(const Vec3& n) {
@@ -27,16 +27,18 @@ Side sideOf(const Vec3& n) {
   return static_cast<Side>(2 * axis + (n[axis] < 0));
 }
 
-/// Whether a normal that points at this side may ask for a record of normal n.
+/// Whether a record with normal n may serve points whose normal points at this side.
 bool mayServe(const Vec3& n, Side side) {
-  // A chord of the allowed angle moves the difference of two coordinates by √2 of its length at most.
+  // Two unit vectors within the allowed angle differ by a chord of bounded length, which changes the difference of two
+  // coordinates by up to √2 times that length.
   const float most = std::sqrt(2 * 2 * (1 - kMinNormalCosine)) + kRounding;
   const float along = side % 2 == 0 ? n[side / 2] : -n[side / 2];
   return along + most >= n.cwiseAbs().maxCoeff();
 }
 
 std::uint64_t cellKey(const Eigen::Vector3i& cell, Side side) {
-  // 20 bits an axis: scenes of a million cells across, beyond which keys wrap and cells are shared, which is harmless.
+  // 20 bits per axis. In a scene of more than 2^20 cells per axis keys wrap around and distant cells share a key, which
+  // is harmless because find tests distances.
   constexpr std::uint64_t mask = (1u << 20) - 1;
   return (static_cast<std::uint64_t>(cell.x()) & mask) | (static_cast<std::uint64_t>(cell.y()) & mask) << 20 |
          (static_cast<std::uint64_t>(cell.z()) & mask) << 40 | static_cast<std::uint64_t>(side) << 60;
@@ -46,11 +48,11 @@ std::size_t slotOf(std::uint64_t key, std::size_t tableSize) {
   return (key * 0x9e3779b97f4a7c15ull) >> (64 - std::countr_zero(tableSize));
 }
 
-// The lanes will be wanted after the reflectance: by then they are here.
+// The Gaussians are needed only after the reflectance has been looked up; prefetching hides the latency.
 void prefetch(const PackedRecord& record) {
   constexpr int kLine = 64;
   const auto* bytes = reinterpret_cast<const char*>(&record);
-  // Of 8 lanes, which are most: asking the record how many it has would wait for it.
+  // For the largest record, of 8 Gaussians: reading the actual count would wait for the memory access.
   constexpr int kBytes = static_cast<int>(sizeof(PackedRecord)) + kGaussianFields * kMaxLightComponents * 4;
   for (int i = 0; i < kBytes; i += kLine) __builtin_prefetch(bytes + i);
 }
@@ -109,7 +111,7 @@ void IlluminationCache::pack(const IlluminationRecord& record) {
   constexpr std::size_t kBlockFloats = sizeof(Block) / sizeof(float);
   const std::size_t floats = static_cast<std::size_t>(stride) * kGaussianFields;
   blocks_.resize(first + 1 + (floats + kBlockFloats - 1) / kBlockFloats);
-  new (&blocks_[first]) PackedRecord{.tangent = record.tangent,
+  new (&blocks_[first]) PackedRecord{.tangentXyz = {record.tangent.x(), record.tangent.y(), record.tangent.z()},
                                      .background = record.background,
                                      .irradiance = record.irradiance,
                                      .samples = record.samples,
@@ -123,7 +125,7 @@ IlluminationRecord IlluminationCache::unpacked(const PackedRecord& record) const
   const Place& place = places_[record.index];
   IlluminationRecord r{.position = place.position,
                        .normal = place.normal,
-                       .tangent = record.tangent,
+                       .tangent = record.tangent(),
                        .radius = place.radius,
                        .background = record.background,
                        .irradiance = record.irradiance,

@@ -1,6 +1,7 @@
 #pragma once
-// Trained illumination: records of L cosθ over the hemisphere of points in the scene, and the look-up of the record
-// that serves a point (Vorba et al. 2014, Section 5). Frozen: read by any number of threads without locks.
+// Trained illumination: records of the distribution of L cosθ over the hemisphere of points in the scene, and the
+// look-up of the record that serves a point (Vorba et al. 2014, Section 5). Immutable, so that any number of threads
+// can read it without locks.
 
 #include <array>
 #include <cstddef>
@@ -16,33 +17,34 @@
 
 namespace lobe {
 
-/// u · 2cosθ/π + (1−u) · Σ π_k N_k over the disc of the frame (tangent, normal × tangent, normal). The plain form, in
-/// which records are made and stored.
+/// A record as it is trained and stored: the density u · 2cosθ/π + (1−u) · Σ π_k N_k, with respect to the area of the
+/// disc of the frame (tangent, normal × tangent, normal).
 struct IlluminationRecord {
   Vec3 position;
   Vec3 normal;         ///< unit
   Vec3 tangent;        ///< unit, orthogonal to normal
-  float radius;        ///< world units, the record serves points within
+  float radius;        ///< world units; the record serves points within this distance
   float background;    ///< u in [0,1]
-  float irradiance;    ///< ∫ L cosθ, from all light, in units that are the same for all records; 0: not known
-  float samples;       ///< particles seen in training
-  float bsdfFraction;  ///< of the BSDF in the product's density, see BsdfSamplingFraction
+  float irradiance;    ///< ∫ L cosθ dω of all light, in one unit for all records; 0 if not known
+  float samples;       ///< number of particles seen in training
+  float bsdfFraction;  ///< BSDF sampling fraction of the product, see BsdfSamplingFraction
   std::int32_t count = 0;
   std::array<Gaussian, kMaxLightComponents> components;  ///< weights sum to 1
 
   std::span<const Gaussian> gaussians() const { return {components.data(), static_cast<std::size_t>(count)}; }
 };
 
-/// What sampling needs of a record: a header that its Gaussians follow in memory.
+/// The part of a record that sampling needs: a header, followed in memory by the Gaussians (SoA).
 struct alignas(32) PackedRecord {
-  Vec3 tangent;
+  std::array<float, 3> tangentXyz;  // no Vec3, so that the record is trivially copyable
   float background;
   float irradiance;
   float samples;
   float bsdfFraction;
   std::uint32_t count : 4;   ///< Gaussians
-  std::uint32_t index : 28;  ///< of the record in its cache, in the order that records were given in
+  std::uint32_t index : 28;  ///< index of the record in its cache, in the order given to the constructor
 
+  Vec3 tangent() const { return {tangentXyz[0], tangentXyz[1], tangentXyz[2]}; }
   static constexpr int strideFor(int count) {
     return count <= kPaddingMultiple ? kPaddingMultiple : kMaxLightComponents;
   }
@@ -50,63 +52,63 @@ struct alignas(32) PackedRecord {
     const int number = static_cast<int>(count);
     return {reinterpret_cast<const float*>(this + 1), strideFor(number), number};
   }
-  /// Of the header and the Gaussians of a record.
+  /// Size of the header and the Gaussians.
   static constexpr std::size_t bytesFor(int count) {
     return sizeof(float) * (8 + kGaussianFields * static_cast<std::size_t>(strideFor(count)));
   }
 };
 
-/// A copy of a record with its Gaussians, which does not depend on the cache that it came from.
+/// A copy of a record with its Gaussians, independent of the lifetime of its cache.
 class RecordCopy {
  public:
   void assign(const PackedRecord& record) {
-    // Sizes that are constants, for which no function is called.
+    // With constant sizes, memcpy is expanded inline.
     if (record.count <= kPaddingMultiple)
       std::memcpy(memory_.data(), &record, PackedRecord::bytesFor(kPaddingMultiple));
     else
       std::memcpy(memory_.data(), &record, PackedRecord::bytesFor(kMaxLightComponents));
   }
-  /// After assign.
+  /// Valid after assign.
   const PackedRecord& operator*() const { return *reinterpret_cast<const PackedRecord*>(memory_.data()); }
   const PackedRecord* operator->() const { return &**this; }
 
  private:
-  static_assert(sizeof(PackedRecord) == 8 * sizeof(float));
+  static_assert(sizeof(PackedRecord) == 8 * sizeof(float) && std::is_trivially_copyable_v<PackedRecord>);
   alignas(PackedRecord) std::array<std::byte, PackedRecord::bytesFor(kMaxLightComponents)> memory_;
 };
 
 class IlluminationCache {
  public:
   IlluminationCache() = default;
-  /// unit: the length that radii are clamped to (see TrainingOptions), > 0.
+  /// unit: the largest radius of a record in world units (see TrainingOptions), > 0.
   IlluminationCache(const std::vector<IlluminationRecord>& records, float unit);
 
-  /// The valid record of least |x−x_j|/unit + 2 sqrt(1.001 − n·n_j): within its radius and about 14° of its normal. n
-  /// is the unit geometric normal on the side asked for. nullptr: none, the BSDF is to be sampled.
+  /// Of the records whose radius contains x and whose normal is within about 14° of n, the one with the smallest cost
+  /// |x−x_j|/unit + 2 sqrt(1.001 − n·n_j); nullptr if there is none. n: unit geometric normal on the side of interest.
   const PackedRecord* find(const Vec3& x, const Vec3& n) const;
 
   std::size_t size() const { return places_.size(); }
-  /// A record of this cache as it was given, to the bit.
+  /// A record of this cache, bit for bit as given to the constructor.
   IlluminationRecord unpacked(const PackedRecord& record) const;
-  /// All records as they were given.
+  /// All records, as given to the constructor.
   std::vector<IlluminationRecord> records() const;
   float unit() const { return unit_; }
   std::size_t bytes() const;
-  double meanComponents() const;  ///< of a record; 0 without records
+  double meanComponents() const;  ///< per record; 0 if there are no records
 
  private:
-  // What find looks at, copied into cell order so that a cell is one run of memory.
+  // The fields that find reads, copied in the order of cells so that the entries of a cell are contiguous.
   struct alignas(32) Entry {
     Vec3 position;
     Vec3 normal;
     float radius2;
-    std::uint32_t block;  // where its record begins
+    std::uint32_t block;  // first block of its record
   };
   struct Cell {
     std::uint64_t key;
     std::uint32_t begin, end;
   };
-  // What only the look-up's making and unpacking need.
+  // The fields needed only to build the look-up and to unpack records.
   struct Place {
     Vec3 position;
     Vec3 normal;
@@ -117,25 +119,26 @@ class IlluminationCache {
     std::array<float, 8> floats;
   };
   struct Placement {
-    std::uint64_t key;  // of the cell and side
+    std::uint64_t key;  // cell and side
     std::uint32_t record;
   };
   void pack(const IlluminationRecord& record);
-  /// Every record in every cell that it reaches into, on every side that it may be asked for, ordered by both.
+  /// Places every record into each cell that its radius overlaps, for each side that it may serve. Sorted by key, then
+  /// by record.
   std::vector<Placement> placeInCells() const;
   const PackedRecord& at(std::uint32_t block) const { return reinterpret_cast<const PackedRecord&>(blocks_[block]); }
   const Cell* findCell(std::uint64_t key) const;
 
-  std::vector<Place> places_;  // ordered by block
-  std::vector<Block> blocks_;  // records, each of as many blocks as it needs
+  std::vector<Place> places_;  // sorted by block
+  std::vector<Block> blocks_;  // the packed records, each of one or more blocks
   float unit_ = 1;
   float inverseCellSize_ = 1;
   std::vector<Entry> entries_;
-  std::vector<Cell> table_;  // open addressing, a power of two; begin == end marks a free slot
+  std::vector<Cell> table_;  // hash table with open addressing; size: a power of two; begin == end marks a free slot
 };
 
-/// The cache with its mixtures merged by `reduce` at this threshold of cost, ≥ 0. Records of four components or fewer
-/// take half the memory.
+/// The cache with each mixture merged by `reduce` up to this threshold, ≥ 0. A record of up to four components takes
+/// about half the memory.
 IlluminationCache reduced(const IlluminationCache& cache, float threshold);
 
 }  // namespace lobe

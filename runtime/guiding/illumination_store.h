@@ -1,5 +1,5 @@
 #pragma once
-// Trained illumination to and from its file.
+// Conversion of trained illumination to and from its file format.
 
 #include <cstddef>
 #include <vector>
@@ -9,11 +9,10 @@
 
 namespace lobe {
 
-/// The bytes of a file that holds the cache; info.unit is the cache's, whatever it was. The same cache and info give
-/// the same bytes.
+/// The bytes of a file that holds the cache; info.unit is replaced by the cache's. Equal input gives equal bytes.
 std::vector<std::byte> storeIllumination(const IlluminationCache& cache, IlluminationInfo info);
 
-/// The cache that was stored, to the bit; its look-up is built anew.
+/// The cache that was stored, with bit-identical records; its look-up structure is rebuilt.
 IlluminationCache loadIllumination(const IlluminationFile& file);
 
 }  // namespace lobe

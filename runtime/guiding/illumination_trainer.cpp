@@ -14,17 +14,18 @@ namespace {
 
 constexpr float kNeighbourNormalCosine = 0.707f;
 constexpr int kUndersampledPerComponent = 5;
-// Of records made at the same time, in units. Closer ones would serve each other once made, and a fit that is dropped
-// was in vain: at 0.3 four of five were, in the kitchen, at 1 one in twenty.
+// Smallest distance, in units, of records that are created in the same round. Records that are closer may serve each
+// other's request, and a fit that is discarded wastes time: in the kitchen scene, four of five fits at a distance of
+// 0.3 and one of twenty at 1.
 constexpr float kRoundSpacing = 1.0f;
-// Of requests that found no particle, in units.
+// Radius, in units, within which further requests are dropped after a request that found no particle.
 constexpr float kEmptySpacing = 0.3f;
 
 void require(bool condition, const char* field, const char* rule) {
-  if (!condition) throw std::runtime_error(std::string("training option ") + field + ": " + rule);
+  if (!condition) throw std::runtime_error(std::string("training option ") + field + " must be " + rule);
 }
 
-/// Points with normals in cells of the largest radius, for questions of the sort "which of them are near".
+/// A hash grid of points with normals, for queries of the points near a position.
 template <class Value>
 class PointGrid {
  public:
@@ -32,7 +33,8 @@ class PointGrid {
 
   void add(const Vec3& x, const Vec3& n, const Value& value) { cells_[key(cell(x))].push_back({x, n, value}); }
 
-  /// Whether f(distance², value) holds for a point closer than a cell whose normal is less than 45° from n.
+  /// Whether f(distance², value) is true for a point with a normal within 45° of n. Finds all points that are closer
+  /// than the size of a cell.
   template <class Predicate>
   bool any(const Vec3& x, const Vec3& n, const Predicate& f) const {
     const Eigen::Vector3i centre = cell(x);
@@ -59,7 +61,7 @@ class PointGrid {
   std::unordered_map<std::uint64_t, std::vector<Entry>> cells_;
 };
 
-/// Takes requests out of `waiting`, in order, that are farther from one another than the distance; the others stay.
+/// Moves requests out of `waiting`, in order, such that they are farther from one another than the distance.
 std::vector<RecordRequest> takeApart(std::vector<RecordRequest>& waiting, float distance) {
   PointGrid<char> grid(distance);
   std::vector<RecordRequest> taken, left;
@@ -75,10 +77,10 @@ std::vector<RecordRequest> takeApart(std::vector<RecordRequest>& waiting, float 
 }  // namespace
 
 void TrainingOptions::validate() const {
-  require(components >= 1 && components <= kMaxIlluminationComponents / 2, "components", "1 to 8");
+  require(components >= 1 && components <= kMaxIlluminationComponents / 2, "components", "from 1 to 8");
   require(neighbours >= 1, "neighbours", "at least 1");
-  require(unitFraction > 0 && unitFraction <= 1, "unit-share", "over 0 and at most 1");
-  require(klThreshold > 0, "kl-threshold", "over 0");
+  require(unitFraction > 0 && unitFraction <= 1, "unitFraction", "over 0 and at most 1");
+  require(klThreshold > 0, "klThreshold", "over 0");
 }
 
 IlluminationTrainer::IlluminationTrainer(const TrainingOptions& options, float sceneDiagonal)
@@ -103,7 +105,8 @@ void IlluminationTrainer::fill(std::span<const std::span<const Particle>> source
 
 void IlluminationTrainer::learnFractions(std::span<const FractionSample> samples) {
   std::vector<std::vector<FractionSample>> ofRecord(records_.size());
-  for (const FractionSample& s : samples) ofRecord[s.record].push_back(s);
+  for (const FractionSample& s : samples)
+    if (s.record < records_.size()) ofRecord[s.record].push_back(s);  // else it is of another field
   parallelFor(std::size_t{0}, records_.size(), [&](std::size_t i) { records_[i].fraction.learn(ofRecord[i]); });
 }
 
@@ -128,10 +131,11 @@ std::optional<double> IlluminationTrainer::updateAll(const ParticleNeighbours& n
   return sum / static_cast<double>(count);
 }
 
-// Requests are served in their order, yet many at a time: each round takes some that are not too close to one another.
-// A record that turns out to be served by one before it is dropped, so the result is that of one request at a time.
+// Processes the requests in their order, but in parallel rounds of requests that are far enough from one another. A new
+// record whose request is already served by an earlier record is discarded, so that the result is the same as when the
+// requests are processed one at a time.
 void IlluminationTrainer::makeRecords(const ParticleNeighbours& neighbours, std::span<const RecordRequest> requests) {
-  PointGrid<float> placed(unit_);  // with radii
+  PointGrid<float> placed(unit_);  // values: radii
   const auto isServed = [&](const RecordRequest& r) {
     return placed.any(r.position, r.normal, [](float d2, float radius) { return d2 <= radius * radius; });
   };
@@ -145,7 +149,7 @@ void IlluminationTrainer::makeRecords(const ParticleNeighbours& neighbours, std:
     parallelFor(std::size_t{0}, round.size(), [&](std::size_t i) { made[i] = makeRecord(neighbours, round[i]); });
     for (std::size_t i = 0; i < round.size(); ++i) {
       if (isServed(round[i])) continue;
-      // Where there is no particle, asking again close by is in vain.
+      // If there is no particle, requests nearby are unlikely to find any.
       placed.add(round[i].position, round[i].normal, made[i] ? made[i]->radius : kEmptySpacing * unit_);
       if (made[i]) records_.push_back(std::move(*made[i]));
     }
@@ -173,8 +177,8 @@ std::optional<IlluminationTrainer::Training> IlluminationTrainer::makeRecord(con
 }
 
 void IlluminationTrainer::shrinkRadius(Training& record) const {
-  // A receiver moved sideways by R sees a source at distance d turned by about atan(R/d); a component may turn by κ
-  // standard deviations of its narrowest axis (training notes, "Validity radius").
+  // For a receiver that moves sideways by R, the direction to a source at distance d turns by about atan(R/d). A
+  // component may turn by κ standard deviations of its narrowest axis.
   double inverse = 0;
   for (const Gaussian& g : record.em.gaussians()) {
     const double half = 0.5 * (g.cov.xx + g.cov.yy);

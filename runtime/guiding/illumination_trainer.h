@@ -1,8 +1,6 @@
 #pragma once
-// Trains illumination records from particles, pass by pass (Vorba et al. 2014, Sections 4 and 5).
-//
-// Results depend on the particles, the requests and their order, never on threads: records are placed one after another
-// in the order of the requests, and each is fitted by itself.
+// Trains illumination records from particles in passes (Vorba et al. 2014, Sections 4 and 5). Results depend on the
+// particles, the requests and their order, but not on threads.
 
 #include <optional>
 #include <span>
@@ -16,46 +14,46 @@
 namespace lobe {
 
 struct TrainingOptions {
-  int components = 8;          ///< Gaussians a record, 1 to 8
-  int neighbours = 250;        ///< particles of each source that a record is updated from, at most
-  float unitFraction = 0.02f;  ///< the length u, as a share of the scene's bounding-box diagonal
-  float klThreshold = 5.0f;    ///< κ, how far in standard deviations a component may move before a record is invalid
+  int components = 8;          ///< Gaussians per record, 1 to 8
+  int neighbours = 250;        ///< largest number of particles of each source per record and pass, ≥ 1
+  float unitFraction = 0.02f;  ///< the largest radius ("unit"), as a fraction of the scene's diagonal, in (0, 1]
+  float klThreshold = 5.0f;    ///< κ: largest parallax within a record's radius, in standard deviations, > 0
 
-  /// Throws std::runtime_error that names the field.
+  /// Throws std::runtime_error that names the first field that is out of range.
   void validate() const;
 };
 
 class IlluminationTrainer {
  public:
-  /// sceneDiagonal: of the bounding box, world units, > 0.
+  /// sceneDiagonal: diagonal of the scene's bounding box in world units, > 0.
   IlluminationTrainer(const TrainingOptions& options, float sceneDiagonal);
 
-  /// One pass: updates every record from the particles around it, then makes a record for each request that no record
-  /// serves yet and that has particles around it. Sources: as ParticleNeighbours; empty ones are fine. Returns the mean
-  /// over the records of log p(particle) (nats, over the disc's area) as it was before they were learnt from: a measure
-  /// on particles held out. nullopt: no record has met a particle.
+  /// Performs one pass: updates every record from the particles near it, then creates a record for each request that no
+  /// record serves and that has particles near it. Sources: as for ParticleNeighbours; they may be empty. Returns the
+  /// mean over the records of the log-likelihood of their particles before the update (nats, density over the disc's
+  /// area), that is, for held-out particles. nullopt if no record had particles near it.
   std::optional<double> learn(std::span<const std::span<const Particle>> sources,
                               std::span<const RecordRequest> requests);
 
-  /// Learns the records' shares of the BSDF. The samples are of records in cache() as it is.
+  /// Updates the records' BSDF sampling fractions. FractionSample::record must be an index into cache().
   void learnFractions(std::span<const FractionSample> samples);
 
-  /// Makes records for requests that none serves from particles that the others have already learnt from.
+  /// Creates records for requests that no record serves, without updating the existing ones.
   void fill(std::span<const std::span<const Particle>> sources, std::span<const RecordRequest> requests);
 
-  /// What has been learnt so far.
+  /// The records as of the last pass.
   const IlluminationCache& cache() const { return cache_; }
 
   float unit() const { return unit_; }
-  /// Share of records that have seen fewer than 5 particles a component.
+  /// The fraction of records that have seen fewer than 5 particles per component; 0 if there are no records.
   double undersampledFraction() const;
 
  private:
   struct Training {
     Vec3 position, normal, tangent;
     float radius;
-    float distance;    // mean distance that the light came from
-    float irradiance;  // mean over the passes since it was made
+    float distance;    // harmonic mean of the distances to the light's origin
+    float irradiance;  // mean over the passes since the record was created
     int passes;
     StepwiseEm em;
     BsdfSamplingFraction fraction;

@@ -1,26 +1,27 @@
 #pragma once
-// What training learns from, and what it is asked for.
+// The input of training: particles, and requests for records.
 
 #include "runtime/mixture/disc.h"
 
 namespace lobe {
 
-/// Light that arrived at a surface. weight is flux (luminance): particles have density L cosθ per area.
+/// Light that arrived at a surface. The directions of the particles near a point, weighted by `weight`, are distributed
+/// in proportion to L cosθ.
 struct Particle {
-  Vec3 position;
-  Vec3 normal;     ///< unit geometric normal, on the side the light arrived at
-  Vec3 direction;  ///< unit, from the surface to where the light came from
-  float weight;    ///< ≥ 0
-  float distance;  ///< world units travelled since the last vertex; +infinity from the environment
-  /// What of the light's flux this particle stands for, all of it, also what weight leaves to emitter sampling; 0 where
-  /// the density of particles does not tell (samples of camera paths).
+  Vec3 position;   ///< world space
+  Vec3 normal;     ///< unit geometric normal on the side where the light arrived
+  Vec3 direction;  ///< unit, from the surface towards the light's origin
+  float weight;    ///< luminance, ≥ 0; of photons the flux, without the part handled by next-event estimation
+  float distance;  ///< world units travelled since the last vertex; +infinity for light from the environment
+  /// Total flux (luminance), before subtracting the part handled by next-event estimation. 0 for samples of camera
+  /// paths, whose density does not give the irradiance.
   float flux = 0;
 };
 
-/// A place where a path asked for a record and found none.
+/// A point at which a path found no record.
 struct RecordRequest {
   Vec3 position;
-  Vec3 normal;  ///< unit, on the side of the path
+  Vec3 normal;  ///< unit geometric normal on the side of the path
 };
 
 }  // namespace lobe

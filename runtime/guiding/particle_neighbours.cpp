@@ -17,7 +17,7 @@ constexpr float kNeighbourNormalCosine = 0.707f;
 
 struct ParticlePositions {
   std::span<const Particle> particles;
-  // The interface nanoflann asks of a data set; its names.
+  // The interface of a data set in nanoflann, with nanoflann's names.
   // NOLINTBEGIN(readability-identifier-naming)
   std::size_t kdtree_get_point_count() const { return particles.size(); }
   float kdtree_get_pt(std::size_t i, std::size_t axis) const {
@@ -33,9 +33,9 @@ struct ParticlePositions {
 using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, ParticlePositions>,
                                                    ParticlePositions, 3, std::uint32_t>;
 
-/// The nearest `count` particles on the side of a normal, in no order. Those of other sides are not taken in at all:
-/// behind a thin wall there may be so many that they would leave no place. nanoflann's own set keeps what it finds
-/// sorted, which costs more than the search: this one collects twice as many and then drops the farther half.
+/// The nearest `count` particles on the side of a normal, unordered. Particles of other sides are rejected during the
+/// search, because those behind a thin wall could otherwise fill the set. nanoflann's own result set is kept sorted,
+/// which costs more than the search; this one collects twice the count and then drops the farther half.
 class NearestSet {
  public:
   using DistanceType = float;
@@ -54,7 +54,7 @@ class NearestSet {
     return neighbours_;
   }
 
-  // The interface nanoflann asks of a result set; its names.
+  // The interface of a result set in nanoflann, with nanoflann's names.
   // NOLINTBEGIN(readability-identifier-naming)
   bool full() const { return true; }  // the bound holds from the start
   float worstDist() const { return worst_; }
@@ -85,7 +85,7 @@ class NearestSet {
   std::vector<Neighbour> neighbours_;
 };
 
-/// Sums over one source.
+/// Sums over the particles of one source.
 struct Tally {
   double weight = 0, squares = 0, inverseDistance = 0, flux = 0;
   float radius2 = 0;

@@ -1,5 +1,5 @@
 #pragma once
-// Finds the particles around a point and tells what they say of the light there.
+// Finds the particles near a point and derives from them the incident light there.
 
 #include <limits>
 #include <memory>
@@ -11,31 +11,31 @@
 
 namespace lobe {
 
-/// What the particles around a point say.
+/// The particles near a point, and estimates derived from them.
 struct Neighbourhood {
-  /// Disc points in the frame (tangent, normal × tangent, normal). Their weights sum to the effective sample size
-  /// (Σw)²/Σw² of the particles of each source, so that sources of any scale and noise can be learnt from together.
+  /// Directions as disc points in the frame (tangent, normal × tangent, normal). The weights of each source are scaled
+  /// to sum to its effective sample size (Σw)²/Σw², so that sources of different scale and noise can be combined.
   std::vector<WeightedPoint> points;
-  /// Distance of the farthest particle, of the source with the larger effective sample size.
+  /// Distance of the farthest particle of the source with the largest effective sample size, in world units.
   float radius = 0;
-  /// Harmonic mean of the distances that the light came from; +infinity when all comes from the environment.
+  /// Weighted harmonic mean of the distances travelled by the light; +infinity if all of it comes from the environment.
   float distance = std::numeric_limits<float>::infinity();
-  /// Flux per area, from the density of particles; 0 when no source tells.
+  /// Irradiance (flux per area) by density estimation; 0 if no particle carries flux.
   float irradiance = 0;
 };
 
 class ParticleNeighbours {
  public:
-  /// Sources: photons, samples of camera paths; viewed, they outlive it. count: of neighbours asked of each source, at
-  /// most; maxDistance: world units, > 0.
+  /// sources: photons and samples of camera paths, which must outlive this object. count: largest number of neighbours
+  /// per source; maxDistance: largest distance in world units, > 0.
   ParticleNeighbours(std::span<const std::span<const Particle>> sources, int count, float maxDistance);
   ~ParticleNeighbours();
 
-  /// No source has a particle.
+  /// Whether no source has a particle.
   bool empty() const { return trees_.empty(); }
 
-  /// The nearest particles of those that arrived on the side of n at a surface turned less than 45° from it. n,
-  /// tangent: unit, orthogonal.
+  /// The nearest particles that arrived on the side of n, at surfaces whose normal is within 45° of n. n, tangent: unit
+  /// and orthogonal.
   Neighbourhood around(const Vec3& x, const Vec3& n, const Vec3& tangent) const;
 
  private:

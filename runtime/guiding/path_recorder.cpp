@@ -52,7 +52,8 @@ void PathRecorder::setDistance(float distance) {
   if (count_ > 0) vertices_[static_cast<std::size_t>(count_ - 1)].distance = distance;
 }
 
-// Light that reached the camera also passed every vertex before: there it is the radiance that arrived from the next.
+// Light that reaches the camera passes through every earlier vertex, where it is incident radiance from the next
+// vertex.
 void PathRecorder::addLight(const Float3& contribution) {
   const Rgb light = toEigen(contribution).array();
   for (int i = 0; i < count_; ++i) {

@@ -11,12 +11,12 @@
 namespace lobe {
 
 struct SampleStorageData {
-  std::vector<Particle> photons;          ///< of photons, of a density in flux per area
-  std::vector<Particle> samples;          ///< of camera paths
-  std::vector<FractionSample> fractions;  ///< of camera paths, for the BSDF sampling fraction
+  std::vector<Particle> photons;          ///< from photons; their density is flux per area
+  std::vector<Particle> samples;          ///< from camera paths
+  std::vector<FractionSample> fractions;  ///< from camera paths, for the BSDF sampling fraction
   std::vector<RecordRequest> requests;
 
-  /// Where the samples of a path begin in each of the lists; they end where the next path's begin.
+  /// The index of the first sample of a path in each of the lists; a path ends where the next one begins.
   struct Path {
     std::uint64_t index;
     std::size_t photons, samples, fractions, requests;
@@ -27,7 +27,7 @@ struct SampleStorageData {
     paths.push_back({index, photons.size(), samples.size(), fractions.size(), requests.size()});
   }
   void append(const SampleStorageData& other);
-  /// The same with its paths in the order of their indices.
+  /// A copy with the paths sorted by index.
   SampleStorageData inOrder() const;
   bool isInOrder() const;
 };

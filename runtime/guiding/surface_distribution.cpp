@@ -13,15 +13,16 @@ namespace {
 
 constexpr float kInvPi = std::numbers::inv_pi_v<float>;
 
-// Records that have seen less than five particles for each of eight components know little, and illumination of which
-// less than this fraction has a shape is sampled by the BSDF as well as by a product.
+// A record is undersampled if it has seen fewer than five particles for each of eight components.
 constexpr float kUndersampled = 40;
+// Illumination is uniform if its background component has more than this weight: BSDF sampling equals the product then.
 constexpr float kUniformBackground = 0.98f;
 
-/// The frame in which both factors of the product are given, as seen from the shading frame: z is the shading normal on
-/// the side of wo, x the record's tangent made orthogonal to it. So records need no turning on flat surfaces.
+/// The rotation from the shading frame to the frame in which both factors of the product are given: its z axis is the
+/// shading normal on the side of wo, its x axis the record's tangent made orthogonal to it. The record's mixture is
+/// used without rotation, which is exact on flat surfaces.
 Eigen::Matrix3f guidingAxes(const ShadingPoint& point, const PackedRecord& record, float side) {
-  const Vec3& world = record.tangent;
+  const Vec3 world = record.tangent();
   const Vec3 tangent(world.dot(toEigen(point.s)), world.dot(toEigen(point.t)), world.dot(toEigen(point.n)));
   const float length = tangent.head<2>().norm();
   const Vec2 x = length > 1e-4f ? Vec2(tangent.head<2>() / length) : Vec2(Vec2::UnitX());
@@ -30,14 +31,14 @@ Eigen::Matrix3f guidingAxes(const ShadingPoint& point, const PackedRecord& recor
   return axes;
 }
 
-/// Samples for what the mixtures do not know are the BSDF's: light that goes through the surface, lobes too narrow.
+/// Leaves the part of the BSDF that is not representable (transmission, lobes that are too narrow) to BSDF sampling.
 StrategyProbabilities onRepresentable(const StrategyProbabilities& probabilities, float representable) {
   return {representable * probabilities.product,
           1 - representable * (probabilities.product + probabilities.illumination),
           representable * probabilities.illumination};
 }
 
-/// The fraction of reflection that the mixtures describe.
+/// The fraction of the described albedo that mixtures represent.
 float representableFraction(const Reflectance& reflectance) {
   const float all = reflectance.albedo + reflectance.unrepresentableAlbedo;
   return all > 0 ? reflectance.albedo / all : 1.0f;
@@ -57,8 +58,9 @@ void SurfaceDistribution::Impl::collectReflectance(const SurfaceReflectance& giv
   reflectance.constant = given.diffuseAlbedo * kInvPi;
   reflectance.backgroundMass = reflectance.constant;
   reflectance.albedo = given.diffuseAlbedo;
-  // On the back, lobes see the frame (s, −t, −n). The lobes we have are symmetric in t, so that this is theirs as well
-  // as the mirrored (s, t, −n) of two-sided materials; for another lobe the density would be worse, not wrong.
+  // On the back, lobes are evaluated in the frame (s, −t, −n). Two-sided materials use the mirrored frame (s, t, −n),
+  // which is equivalent for lobes that are symmetric in t, as all of Lobe's are. For other lobes the density would be a
+  // worse fit, but estimates would stay unbiased.
   const Vec3 above(wo.x(), side * wo.y(), side * wo.z());
   const Vec2 turn(axes(0, 0), axes(1, 0));
   for (const TintedLobe& lobe : given.lobes)
@@ -66,8 +68,8 @@ void SurfaceDistribution::Impl::collectReflectance(const SurfaceReflectance& giv
 }
 
 FractionSample SurfaceDistribution::Impl::fractionSample(const Vec3& wi, float bsdfPdf) const {
-  const float divided =
-      representable * (1 - record->bsdfFraction);  // the mixtures' with the background that is the BSDF's
+  // The probability of the mixtures, including the product's background term that is left to BSDF sampling.
+  const float divided = representable * (1 - record->bsdfFraction);
   const float background = density->bsdfFraction() - (1 - divided);
   const float mixtures = (std::max(0.0f, background) * bsdfPdf + density->guidedPdf(axes * wi)) / divided;
   return {record->index, bsdfPdf, mixtures, representable};
@@ -80,7 +82,7 @@ SurfaceDistribution::SurfaceDistribution(const Field& field, const ShadingPoint&
   const PackedRecord* record = field.cache().find(toEigen(point.position), side * toEigen(point.normal));
   if (!record) return;
   hasRecord_ = true;
-  // Default-initialised: the Gaussians of the reflectance and of the record are left as they are until they are set.
+  // Default-initialised, so that the arrays of Gaussians are not zeroed.
   Impl& self = *new (storage_) Impl;
   self.wo = toEigen(point.wo);
   self.side = side;
@@ -128,7 +130,7 @@ float SurfaceDistribution::guidedPdf(const Float3& wi) const {
 std::optional<float> SurfaceDistribution::reflectedRadiance(float albedo) const {
   if (!hasRecord_) return std::nullopt;
   const Impl& self = impl();
-  // Nothing is known of what lobes without a fit reflect.
+  // The radiance reflected by lobes without a cache, and transmitted radiance, cannot be estimated.
   if (!(self.record->irradiance > 0) || !self.described) return std::nullopt;
   if (!self.product) return self.record->irradiance * albedo * kInvPi;
   const bool shaped = decision_ == GuidingDecision::product || decision_ == GuidingDecision::illumination;

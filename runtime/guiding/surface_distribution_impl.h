@@ -12,19 +12,20 @@
 namespace lobe {
 
 struct SurfaceDistribution::Impl {
-  RecordCopy record;  // empty: none serves the point, and density is empty
+  RecordCopy record;
   Vec3 wo;
-  Eigen::Matrix3f axes;     // from the shading frame to the frame of the guiding mixtures
-  float side = 1;           // 1 where wo is in front, −1 on the back
-  float representable = 0;  // fraction of samples that mixtures may draw
+  Eigen::Matrix3f axes;     // rotation from the shading frame to the frame of the mixtures
+  float side = 1;           // 1 if wo.z ≥ 0, else −1
+  float representable = 0;  // largest fraction of samples that mixtures may draw
   bool product = false;
-  bool described = false;  // the reflectance is all that is reflected
+  bool described = false;  // undescribedFraction is 0
   Reflectance reflectance;
   std::optional<GuidedDensity> density;
 
   void collectReflectance(const SurfaceReflectance& given, const BrdfCaches& caches);
   GuidingDecision decide() const;
-  /// What a direction tells of the record's BSDF sampling fraction, but for its weight. Only where learnsFraction().
+  /// The training sample of a direction for the record's BSDF sampling fraction, without its weight. Requires
+  /// learnsFraction().
   FractionSample fractionSample(const Vec3& wi, float bsdfPdf) const;
 };
 

@@ -28,7 +28,7 @@ float relativeError(const Rgb& reference, const Rgb& value) {
   return static_cast<float>(sum / 3.0);
 }
 
-// Of sorted values, without the largest `share`.
+// Mean of the sorted values without the given fraction of largest ones.
 double trimmedMean(const std::vector<float>& sorted, double fraction) {
   const std::size_t kept = sorted.size() - static_cast<std::size_t>(fraction * static_cast<double>(sorted.size()));
   double sum = 0;
@@ -45,7 +45,7 @@ double squaredDistance(const Rgb& a, const Rgb& b) {
 Image averagedDown(const Image& image, int factor) {
   if (factor < 1 || image.width % factor != 0 || image.height % factor != 0)
     throw std::runtime_error(
-        fmt::format("{}x{} pixels are not squares of {} a side", image.width, image.height, factor));
+        fmt::format("{0}x{1} pixels cannot be divided into blocks of {2}x{2}", image.width, image.height, factor));
   Image result(image.width / factor, image.height / factor);
   const float fraction = 1.0f / static_cast<float>(factor * factor);
   for (int y = 0; y < image.height; ++y)

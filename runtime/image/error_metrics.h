@@ -1,5 +1,5 @@
 #pragma once
-// How far an image is from a reference.
+// Error of an image relative to a reference.
 
 #include <cstddef>
 #include <vector>
@@ -8,8 +8,8 @@
 
 namespace lobe {
 
-/// A pixel's relative error is the mean over its channels of (x−r)²/(r²+0.01). Pixels that are not finite, in either
-/// image, are left out of all means and counted.
+/// The relative error of a pixel is the mean over its channels of (x−r)²/(r²+0.01). Pixels that are not finite in
+/// either image are excluded from all means and counted.
 struct ErrorMetrics {
   double mse = 0;           ///< mean over pixels and channels of (x−r)²
   double relmse = 0;        ///< mean over pixels of the relative error
@@ -19,10 +19,11 @@ struct ErrorMetrics {
   std::size_t nonfinite = 0;
 };
 
-/// Throws std::runtime_error when the sizes differ or there are no pixels.
+/// Throws std::runtime_error if the sizes differ or there are no pixels.
 ErrorMetrics compareImages(const Image& reference, const Image& image);
 
-/// Each pixel the mean of factor × factor pixels. Throws std::runtime_error unless factor ≥ 1 divides both sizes.
+/// Downsamples an image: each pixel is the mean of factor × factor pixels. Throws std::runtime_error unless factor ≥ 1
+/// divides width and height.
 Image averagedDown(const Image& image, int factor);
 
 /// The relative error of each pixel, row by row; NaN where a pixel is not finite. Throws like compareImages.

@@ -26,7 +26,7 @@
 #include "runtime/image/jpeg_file.h"
 #include "runtime/image/rgbe_file.h"
 
-// Private to this file, so that another copy elsewhere does not clash.
+// Static functions, so that another copy of stb_image in the program does not clash.
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
 #define STBI_NO_GIF
@@ -44,7 +44,7 @@
 namespace lobe {
 namespace {
 
-/// A damaged header must not make us ask for all memory there is.
+/// Largest image that is read, so that a damaged header does not exhaust the memory.
 constexpr std::int64_t kMaxPixels = std::int64_t{1} << 27;
 
 [[noreturn]] void fail(const std::filesystem::path& path, const std::string& fault) {
@@ -53,15 +53,16 @@ constexpr std::int64_t kMaxPixels = std::int64_t{1} << 27;
 
 void checkSize(const std::filesystem::path& path, std::int64_t width, std::int64_t height) {
   if (width <= 0 || height <= 0 || width > kMaxPixels / height)
-    fail(path, fmt::format("its size of {}x{} pixels is beyond what is read", width, height));
+    fail(path, fmt::format("its size of {}x{} pixels is outside the supported range", width, height));
 }
 
-/// Nor must a file of some kilobytes, of which even a uniform picture takes more than this where it is large.
+/// Refuses small files that claim large images: even uniform images compress to no more than kMostPerByte pixels per
+/// byte.
 void checkExpansion(const std::filesystem::path& path, std::int64_t width, std::int64_t height, std::size_t bytes) {
   constexpr std::int64_t kLarge = std::int64_t{1} << 24, kMostPerByte = 2000;
   checkSize(path, width, height);
   if (width * height > kLarge && width * height / kMostPerByte > static_cast<std::int64_t>(bytes))
-    fail(path, fmt::format("its {}x{} pixels are too many to be meant by a file of {} bytes", width, height, bytes));
+    fail(path, fmt::format("a file of {2} bytes cannot contain {0}x{1} pixels", width, height, bytes));
 }
 
 float decode(float encoded, const Encoding& encoding) {
@@ -71,7 +72,7 @@ float decode(float encoded, const Encoding& encoding) {
     case Encoding::Kind::gamma:
       return std::pow(encoded, encoding.exponent);
     case Encoding::Kind::srgb:
-    case Encoding::Kind::tagged:  // without a tag
+    case Encoding::Kind::tagged:  // no gAMA chunk
       break;
   }
   return decodeSrgb(encoded);
@@ -79,7 +80,7 @@ float decode(float encoded, const Encoding& encoding) {
 
 // ---- EXR
 
-/// What of a file becomes the image: its colours, or its alpha channel as grey.
+/// The part of a file that is read: its colours, or its alpha channel as grey.
 enum class Part { colours, alpha };
 
 using ChannelNames = std::array<const char*, 3>;
@@ -97,7 +98,7 @@ ChannelNames exrChannels(const std::filesystem::path& path, const Imf::ChannelLi
   if (channels.findChannel("Y") && !chroma) return {"Y", "Y", "Y"};
   std::string names;
   for (auto it = channels.begin(); it != channels.end(); ++it) names += fmt::format(" {}", it.name());
-  fail(path, fmt::format("needs channels R, G and B or Y alone, but has{}", names.empty() ? " none" : names));
+  fail(path, fmt::format("needs the channels R, G and B, or only Y, but has{}", names.empty() ? " none" : names));
 }
 
 struct Area {
@@ -110,7 +111,7 @@ struct Area {
   std::int64_t left, top, width, height;
 };
 
-/// What of the data window lies in the display window, black around it.
+/// Crops or pads the data window to the display window; pixels outside the data window are black.
 Image placeOnDisplay(const Image& data, const Area& dataWindow, const Area& display) {
   Image image(static_cast<int>(display.width), static_cast<int>(display.height));
   const std::int64_t dx = display.left - dataWindow.left, dy = display.top - dataWindow.top;
@@ -121,18 +122,18 @@ Image placeOnDisplay(const Image& data, const Area& dataWindow, const Area& disp
   return image;
 }
 
-/// The data window of the file, whichever of its channels are asked for.
+/// Reads the requested channels of the data window.
 Image readDataWindow(const std::filesystem::path& path, Imf::InputFile& file, const Area& area, Part part) {
   const ChannelNames names = exrChannels(path, file.header().channels(), part);
   const int distinct = names[0] == names[1] ? 1 : 3;
   Image image(static_cast<int>(area.width), static_cast<int>(area.height));
-  // OpenEXR addresses pixels by their place in the data window, hence the shifted origin.
+  // OpenEXR addresses pixels by their coordinates in the data window, hence the shifted origin.
   constexpr std::int64_t kStride = sizeof(Rgb);
   char* origin = reinterpret_cast<char*>(image.pixels.data()) - kStride * (area.left + area.top * area.width);
   Imf::FrameBuffer frame;
   for (int c = 0; c < distinct; ++c) {
     const Imf::Channel& channel = file.header().channels()[names[c]];
-    if (channel.xSampling != 1 || channel.ySampling != 1) fail(path, "subsampled channels are not read");
+    if (channel.xSampling != 1 || channel.ySampling != 1) fail(path, "subsampled channels are not supported");
     frame.insert(names[c], Imf::Slice(Imf::FLOAT, origin + c * sizeof(float), kStride, kStride * area.width));
   }
   file.setFrameBuffer(frame);
@@ -156,13 +157,13 @@ Image readExr(const std::filesystem::path& path, Part part) {
   try {
     return readExrPixels(path, part);
   } catch (const std::bad_alloc&) {
-    fail(path, "too large for the memory there is");
+    fail(path, "not enough memory to read the image");
   } catch (const Iex::BaseExc& e) {
     fail(path, fmt::format("damaged EXR file ({})", e.what()));
   }
 }
 
-// ---- everything else
+// ---- Other formats
 
 struct FreePixels {
   void operator()(void* pixels) const { stbi_image_free(pixels); }
@@ -170,8 +171,8 @@ struct FreePixels {
 template <class T>
 using Pixels = std::unique_ptr<T, FreePixels>;
 
-/// The file as stb_image takes it, to find out whether it asks for more than there is: JPEG and TGA files cut short
-/// would pass for whole ones.
+/// Callbacks through which stb_image reads the file. They detect reads past its end, because stb_image accepts
+/// truncated TGA files.
 struct Source {
   std::string_view rest;
   bool exhausted = false;
@@ -197,7 +198,7 @@ constexpr stbi_io_callbacks kSourceCallbacks = {Source::read, Source::skip, Sour
 /// Red, green, blue and alpha of a pixel.
 constexpr int kComponents = 4;
 
-/// The pixels of an integer format by a table of what each code means.
+/// Decodes the pixels of an integer format with a look-up table of all values.
 template <class T>
 Image decodeColours(const T* codes, int width, int height, const Encoding& encoding) {
   constexpr int kLargest = std::numeric_limits<T>::max();
@@ -221,7 +222,7 @@ Image decodeAlpha(const T* codes, int width, int height) {
   return image;
 }
 
-/// Loads by one of stb_image's functions.
+/// Loads an image with one of stb_image's loaders.
 template <class T, class Load>
 Image loadPixels(const std::filesystem::path& path, std::string_view bytes, const Encoding& encoding, Part part,
                  Load load) {
@@ -247,10 +248,11 @@ std::uint32_t bigEndian(std::string_view bytes) {
   return value;
 }
 
-/// The exponent that a PNG's gAMA chunk asks for; nullopt where there is none, or an sRGB chunk, which goes before.
+/// The exponent given by a PNG's gAMA chunk; nullopt without such a chunk, or with an sRGB chunk, which takes
+/// precedence.
 std::optional<float> gammaOfPng(std::string_view bytes) {
   constexpr std::string_view kSignature = "\x89PNG\r\n\x1a\n";
-  constexpr std::size_t kAround = 12;  // of a chunk's data: length, name and checksum
+  constexpr std::size_t kAround = 12;  // bytes around the data of a chunk: length, name and checksum
   std::optional<float> gamma;
   bytes.remove_prefix(bytes.starts_with(kSignature) ? kSignature.size() : bytes.size());
   while (bytes.size() >= kAround) {
@@ -265,7 +267,7 @@ std::optional<float> gammaOfPng(std::string_view bytes) {
   return gamma;
 }
 
-/// What the file says of itself, where that is what is wanted.
+/// Replaces a tagged encoding by the one that the file specifies.
 Encoding resolved(const Encoding& encoding, std::string_view bytes) {
   if (encoding.kind != Encoding::Kind::tagged) return encoding;
   const std::optional<float> gamma = gammaOfPng(bytes);
@@ -282,14 +284,15 @@ Image readJpegImage(const std::filesystem::path& path, std::string_view bytes, c
 
 Image readOther(const std::filesystem::path& path, const Encoding& encoding, Part part) {
   const std::string bytes = nameErrors(path, [&] { return readFile(path); });
-  if (bytes.size() > static_cast<std::size_t>(std::numeric_limits<int>::max())) fail(path, "too large a file");
+  if (bytes.size() > static_cast<std::size_t>(std::numeric_limits<int>::max()))
+    fail(path, "files over 2 GiB are not supported");
   if (startsLikeRgbe(bytes)) return readHdr(path, bytes, part);
   if (startsLikeJpeg(bytes)) return readJpegImage(path, bytes, encoding, part);
   const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
   const int length = static_cast<int>(bytes.size());
   int width = 0, height = 0, channels = 0;
   if (!stbi_info_from_memory(data, length, &width, &height, &channels))
-    fail(path, fmt::format("not an image that can be read ({}); known are PNG, JPEG, BMP, TGA, HDR and EXR",
+    fail(path, fmt::format("unsupported image format ({}); supported are PNG, JPEG, BMP, TGA, HDR and EXR",
                            stbi_failure_reason()));
   checkExpansion(path, width, height, bytes.size());
   if (part == Part::alpha && channels != 2 && channels != 4) failWithoutAlpha(path);

@@ -1,5 +1,5 @@
 #pragma once
-// Pixels in memory, and reading them from files.
+// Images in memory, and readers for image files.
 
 #include <filesystem>
 #include <vector>
@@ -23,23 +23,23 @@ struct Image {
 
 class Fingerprint;
 
-/// Adds size and pixels.
+/// Adds the size and the pixels to the hash.
 void addTo(Fingerprint& hash, const Image& image);
 
-/// How the numbers of an 8- or 16-bit file become linear: by the sRGB curve, as they are, by a power (gamma), or as the
-/// file itself says (tagged: the gAMA chunk of a PNG that has no sRGB chunk; sRGB where there is nothing of the kind).
+/// Conversion of 8- and 16-bit values to linear ones: the sRGB curve, none (linear), a power (gamma), or as the file
+/// specifies (tagged: the gAMA chunk of a PNG without sRGB chunk, otherwise sRGB).
 struct Encoding {
   enum class Kind { srgb, linear, gamma, tagged } kind = Kind::srgb;
   float exponent = 1.0f;
 };
 
-/// Reads PNG, JPEG, BMP, TGA (stb_image), HDR (rgbe_file.h) and EXR (OpenEXR; R, G, B or a single luminance channel Y;
-/// the picture is the display window, black where the file has no pixels). Files with floating-point data are linear
-/// whatever the encoding says. Alpha is dropped. Throws std::runtime_error that names the file and the fault.
+/// Reads PNG, JPEG, BMP, TGA (stb_image), HDR (rgbe_file.h) and EXR (OpenEXR; R, G, B or a single luminance channel Y).
+/// The image of an EXR file is the display window, black outside the data window. Floating-point data are linear
+/// whatever the encoding. Alpha is discarded. Throws std::runtime_error that names the file and the fault.
 Image readImage(const std::filesystem::path& path, Encoding encoding = {});
 
-/// The alpha channel of such a file as grey: linear, from 0 to 1 where the file holds integers. Throws
-/// std::runtime_error, also where there is no such channel.
+/// The alpha channel of a file as a grey image: linear, scaled to [0, 1] for integer formats. Throws std::runtime_error
+/// like readImage, and if there is no alpha channel.
 Image readAlpha(const std::filesystem::path& path);
 
 }  // namespace lobe

@@ -75,7 +75,8 @@ void appendBytes(void* context, void* data, int size) {
 void checkImageName(const std::filesystem::path& path) {
   const std::string extension = extensionOf(path);
   if (extension != ".exr" && extension != ".png")
-    throw std::runtime_error(fmt::format("{}: an image is written as .exr or .png", path.string()));
+    throw std::runtime_error(
+        fmt::format("{}: unsupported image format; images are written as .exr or .png", path.string()));
 }
 
 void writePng(const std::filesystem::path& path, int width, int height, const std::vector<std::uint8_t>& rgb) {

@@ -17,7 +17,7 @@ using Decoder = std::unique_ptr<void, DestroyDecoder>;
 
 Decoder makeDecoder() {
   Decoder decoder(tjInitDecompress());
-  if (!decoder) throw std::runtime_error("the JPEG decoder cannot be started");
+  if (!decoder) throw std::runtime_error("the JPEG decoder cannot be initialised");
   return decoder;
 }
 
@@ -38,7 +38,7 @@ JpegSize sizeOf(const Decoder& decoder, std::string_view bytes) {
   return size;
 }
 
-/// Pictures with harmless oddities are decoded whole, with a warning; those that end too early are not.
+/// libjpeg-turbo only warns about truncated files, as it does about harmless defects, which are accepted.
 bool endsTooEarly(const Decoder& decoder) {
   return std::string_view(tjGetErrorStr2(decoder.get())).find("remature end") != std::string_view::npos;
 }

@@ -7,7 +7,7 @@
 
 namespace lobe {
 
-/// Eight-bit codes of red, green, blue and alpha, row by row from the top; alpha is 255.
+/// 8-bit red, green, blue and alpha, row by row from the top; alpha is 255.
 struct JpegPixels {
   int width, height;
   std::vector<std::uint8_t> codes;
@@ -19,10 +19,10 @@ struct JpegSize {
   int width, height;
 };
 
-/// Throws std::runtime_error when the header is damaged.
+/// Throws std::runtime_error if the header is damaged.
 JpegSize sizeOfJpeg(std::string_view bytes);
 
-/// Throws std::runtime_error when the file is damaged or ends too early, or std::bad_alloc.
+/// Throws std::runtime_error if the file is damaged or truncated, or std::bad_alloc.
 JpegPixels readJpeg(std::string_view bytes);
 
 }  // namespace lobe

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kLargestExact = 0x1p53;
 
-/// What a picture says of itself.
+/// An image to be merged: its attributes, samples per pixel and sample ranges.
 struct Part {
   std::filesystem::path path;
   ImageAttributes attributes;
@@ -62,7 +62,7 @@ bool sameStream(const SampleRange& a, const SampleRange& b) {
   return a.integrator == b.integrator && a.seed == b.seed;
 }
 
-/// Sorted, those that touch made one.
+/// Sorts the ranges and joins adjacent ones.
 std::vector<SampleRange> joined(std::vector<SampleRange> ranges) {
   std::ranges::sort(ranges, {}, [](const SampleRange& r) { return std::tuple(r.integrator, r.seed, r.first); });
   std::vector<SampleRange> result;
@@ -79,8 +79,8 @@ Part describe(const std::filesystem::path& path) {
   Part part{path, readAttributes(path), 0, {}};
   const std::optional<std::uint64_t> samples = findCount(part.attributes, "samples");
   if (!samples || *samples == 0)
-    throw std::runtime_error(fmt::format(
-        "{}: does not say how many samples it has; loberender writes that into .exr pictures", path.string()));
+    throw std::runtime_error(
+        fmt::format("{}: does not say how many samples it has; merge .exr files written by loberender", path.string()));
   part.samples = static_cast<double>(*samples);
   try {
     part.ranges = sampleRanges(part.attributes);
@@ -90,13 +90,13 @@ Part describe(const std::filesystem::path& path) {
   return part;
 }
 
-/// Pictures that do not say what they show are taken on trust.
+/// Images without the attribute sceneHash are accepted.
 void checkSameScene(const Part& a, const Part& b) {
   const auto one = find<std::string>(a.attributes, "sceneHash"), other = find<std::string>(b.attributes, "sceneHash");
   if (one && other && *one != *other)
-    throw std::runtime_error(fmt::format(
-        "{} and {}: of different scenes or cameras (sceneHash {} and {}); parts of one picture have to be of one scene",
-        a.path.string(), b.path.string(), *one, *other));
+    throw std::runtime_error(
+        fmt::format("{} and {}: renders of different scenes or cameras cannot be merged (sceneHash {} and {})",
+                    a.path.string(), b.path.string(), *one, *other));
 }
 
 void checkDisjoint(const Part& a, const Part& b) {
@@ -104,9 +104,10 @@ void checkDisjoint(const Part& a, const Part& b) {
     for (const SampleRange& s : b.ranges) {
       const std::uint64_t first = std::max(r.first, s.first), last = std::min(r.last, s.last);
       if (sameStream(r, s) && first < last)
-        throw std::runtime_error(fmt::format(
-            "{} and {}: both have samples {} to {} of seed {} by {}: render one with another --sample-offset or --seed",
-            a.path.string(), b.path.string(), first, last - 1, r.seed, r.integrator));
+        throw std::runtime_error(
+            fmt::format("{} and {}: both contain samples {} to {} of seed {} and integrator {}; change --sample-offset "
+                        "or --seed of one",
+                        a.path.string(), b.path.string(), first, last - 1, r.seed, r.integrator));
     }
 }
 
@@ -150,7 +151,7 @@ Image weightedMean(const std::vector<Part>& parts) {
       sum.assign(image.pixels.size(), Eigen::Array3d::Zero());
     }
     if (image.width != result.width || image.height != result.height)
-      throw std::runtime_error(fmt::format("{}: has {}x{} pixels, {} {}x{}", part.path.string(), image.width,
+      throw std::runtime_error(fmt::format("{}: has {}x{} pixels, but {} has {}x{}", part.path.string(), image.width,
                                            image.height, parts.front().path.string(), result.width, result.height));
     for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += part.samples * image.pixels[i].cast<double>();
     samples += part.samples;

@@ -1,5 +1,5 @@
 #pragma once
-// Pictures of the same scene made in parts, put together.
+// Merges renders of the same scene with different samples.
 
 #include <cstdint>
 #include <filesystem>
@@ -11,16 +11,17 @@
 
 namespace lobe {
 
-/// Samples [first, last) of every pixel's random stream, of one seed and integrator: the same range again is no news.
+/// Samples [first, last) of every pixel's random stream, for one seed and integrator. Rendering the same range again
+/// gives the same samples.
 struct SampleRange {
   std::string integrator;
   std::uint64_t seed;
   std::uint64_t first, last;
 };
 
-/// The ranges that a picture's attributes tell of, in no order: sampleRanges (of one that was merged), or else the one
-/// of integrator, seed, sampleOffset (0 when missing) and samples; empty when they do not say. Throws
-/// std::runtime_error when sampleRanges is not as mergeImages writes it.
+/// The sample ranges recorded in the attributes of an image, in any order: those of sampleRanges (merged images),
+/// otherwise the range given by integrator, seed, sampleOffset (default 0) and samples; empty if these are missing.
+/// Throws std::runtime_error if sampleRanges does not have the format that mergeImages writes.
 std::vector<SampleRange> sampleRanges(const ImageAttributes& attributes);
 
 struct MergedImage {
@@ -28,10 +29,11 @@ struct MergedImage {
   ImageAttributes attributes;
 };
 
-/// The mean of pictures weighted by their samples a pixel. Of attributes those are kept that all have in common;
-/// samples is the sum, and what is known of ranges is seed and sampleOffset when they join to one, else sampleRanges.
-/// So a merged picture can be merged again. Throws std::runtime_error that names the file, or two, when a picture does
-/// not say how many samples it has, sizes differ, or two hold samples of the same range.
+/// The mean of the images weighted by their samples per pixel. Attributes that all images have in common are kept, and
+/// samples is the sum. The ranges are stored as seed and sampleOffset if they form one range, otherwise as
+/// sampleRanges, so that a merged image can be merged again. Throws std::runtime_error that names the file or files if
+/// an image does not record its number of samples, sizes or scenes differ, or two images contain samples of the same
+/// range.
 MergedImage mergeImages(std::span<const std::filesystem::path> paths);
 
 }  // namespace lobe

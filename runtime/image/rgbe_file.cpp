@@ -20,7 +20,7 @@ namespace {
   throw std::runtime_error(fault);
 }
 
-/// Three mantissas and their exponent.
+/// Three mantissas and the exponent that they share.
 using Rgbe = std::array<std::uint8_t, 4>;
 
 class Bytes {
@@ -28,7 +28,7 @@ class Bytes {
   explicit Bytes(std::string_view rest) : rest_(rest) {}
 
   std::uint8_t next() {
-    if (rest_.empty()) fail("damaged image (it ends too early)");
+    if (rest_.empty()) fail("damaged image (unexpected end of file)");
     const auto byte = static_cast<std::uint8_t>(rest_.front());
     rest_.remove_prefix(1);
     return byte;
@@ -40,10 +40,10 @@ class Bytes {
     return pixel;
   }
 
-  /// Up to the next line feed, without it and without a carriage return before it.
+  /// The text up to the next line feed, without it and without a carriage return before it.
   std::string_view line() {
     const std::size_t length = rest_.find('\n');
-    if (length == std::string_view::npos) fail("damaged image (it ends too early)");
+    if (length == std::string_view::npos) fail("damaged image (unexpected end of file)");
     std::string_view line = rest_.substr(0, length);
     rest_.remove_prefix(length + 1);
     if (line.ends_with('\r')) line.remove_suffix(1);
@@ -54,20 +54,20 @@ class Bytes {
   std::string_view rest_;
 };
 
-/// One of the two axes that pixels are stored along: which one, its direction, and its length.
+/// One of the two axes along which pixels are stored: its name, direction and length.
 struct Axis {
   char name;
   bool rising;
   int size;
 };
 
-/// Pixels follow each other along the second axis, lines of them along the first.
+/// Pixels of a scanline follow each other along the second axis, scanlines along the first.
 struct Header {
   bool xyz = false;
   Axis lines, pixels;
 };
 
-/// Takes "+X 640" off the text.
+/// Parses an axis such as "+X 640" and removes it from the text.
 Axis takeAxis(std::string_view& text) {
   constexpr int kLargest = 1 << 27;
   Axis axis{};
@@ -76,7 +76,7 @@ Axis takeAxis(std::string_view& text) {
   const char* begin = text.data() + std::min<std::size_t>(3, text.size());
   const auto [end, error] = std::from_chars(begin, text.data() + text.size(), axis.size);
   if (!known || error != std::errc() || axis.size <= 0 || axis.size > kLargest)
-    fail(fmt::format("damaged image (\"{}\" where its size should be, as in -Y 480 +X 640)", text.substr(0, 40)));
+    fail(fmt::format("damaged image (expected a size such as -Y 480 +X 640, found \"{}\")", text.substr(0, 40)));
   axis.name = text[1];
   axis.rising = text[0] == '+';
   text.remove_prefix(static_cast<std::size_t>(end - text.data()));
@@ -93,20 +93,20 @@ Header readHeader(Bytes& bytes) {
     line.remove_prefix(kFormat.size());
     header.xyz = line == "32-bit_rle_xyze";
     if (!header.xyz && line != "32-bit_rle_rgbe")
-      fail(fmt::format("unknown pixel format \"{}\"; known are 32-bit_rle_rgbe and 32-bit_rle_xyze", line));
+      fail(fmt::format("unknown pixel format \"{}\"; supported are 32-bit_rle_rgbe and 32-bit_rle_xyze", line));
   }
   std::string_view size = bytes.line();
   header.lines = takeAxis(size);
   header.pixels = takeAxis(size);
-  if (header.lines.name == header.pixels.name) fail("damaged image (its size has the same axis twice)");
+  if (header.lines.name == header.pixels.name) fail("damaged image (the size names the same axis twice)");
   return header;
 }
 
 [[noreturn]] void failAtRun() {
-  fail("damaged image (a run of pixels is longer than its line)");
+  fail("damaged image (a run of pixels is longer than its scanline)");
 }
 
-/// New run lengths: all first components of the line, then all second ones, and so on.
+/// New run-length encoding: all first components of the scanline, then all second ones, and so on.
 void readComponents(Bytes& bytes, std::span<Rgbe> line) {
   constexpr std::size_t kRun = 128;
   for (std::size_t component = 0; component < 4; ++component) {
@@ -120,8 +120,8 @@ void readComponents(Bytes& bytes, std::span<Rgbe> line) {
   }
 }
 
-/// Whole pixels, and old run lengths: a pixel with mantissas of 1 repeats the one before as often as its exponent says.
-/// Several of them in a row are the digits of a number, the lowest first.
+/// Uncompressed pixels and old run-length encoding: a pixel whose mantissas are all 1 repeats the previous pixel; its
+/// exponent is the number of repetitions. Several such pixels in a row hold the bytes of one number, the lowest first.
 void readPixels(Bytes& bytes, Rgbe pixel, std::span<Rgbe> line) {
   int shift = 0;
   for (std::size_t i = 0;; pixel = bytes.pixel()) {
@@ -140,12 +140,12 @@ void readPixels(Bytes& bytes, Rgbe pixel, std::span<Rgbe> line) {
 }
 
 void readLine(Bytes& bytes, std::span<Rgbe> line) {
-  constexpr std::size_t kShortest = 8, kLongest = 0x7fff;  // of those with new run lengths
+  constexpr std::size_t kShortest = 8, kLongest = 0x7fff;  // lengths of scanlines with new run-length encoding
   const Rgbe first = bytes.pixel();
   const bool coded = first[0] == 2 && first[1] == 2 && first[2] < 128 && line.size() >= kShortest;
   if (!coded || line.size() > kLongest) return readPixels(bytes, first, line);
   if (static_cast<std::size_t>(first[2] << 8 | first[3]) != line.size())
-    fail("damaged image (a line of another length)");
+    fail("damaged image (a scanline of the wrong length)");
   readComponents(bytes, line);
 }
 
@@ -156,7 +156,7 @@ Rgb decode(const Rgbe& pixel, bool xyz) {
   return xyz ? rgbOfXyz(value) : Rgb(value.cast<float>().array());
 }
 
-/// Where the i-th along the axis belongs, counted from the left or from the top.
+/// Position of the i-th element along the axis, counted from the left or from the top.
 int place(const Axis& axis, int i) {
   const bool forwards = axis.name == 'X' ? axis.rising : !axis.rising;
   return forwards ? i : axis.size - 1 - i;
@@ -178,7 +178,7 @@ std::array<int, 2> sizeOfRgbe(std::string_view data) {
 Image readRgbe(std::string_view data) {
   Bytes bytes(data);
   const auto [xyz, lines, pixels] = readHeader(bytes);
-  // Grows as it is read, so that a file cut short does not ask for memory that it has no pixels for.
+  // Grows during reading, so that a truncated file does not allocate memory for pixels that it does not contain.
   std::vector<Rgbe> stored;
   const auto length = static_cast<std::size_t>(pixels.size);
   for (int i = 0; i < lines.size; ++i) {

@@ -1,5 +1,5 @@
 #pragma once
-// Pictures in Radiance's format (.hdr): RGBE and XYZE.
+// Radiance images (.hdr) in RGBE and XYZE.
 
 #include <array>
 #include <string_view>
@@ -8,15 +8,15 @@
 
 namespace lobe {
 
-/// Whether the bytes are the beginning of such a picture.
+/// Whether the bytes begin with the signature of a Radiance image.
 bool startsLikeRgbe(std::string_view bytes);
 
-/// Width and height of the picture. Throws like readRgbe.
+/// Width and height of the image. Throws like readRgbe.
 std::array<int, 2> sizeOfRgbe(std::string_view bytes);
 
-/// The picture as it is to be seen, in whatever order its rows and columns are stored; flat pixels and both kinds of
-/// run lengths. XYZE becomes linear Rec. 709. An exposure in the header is not undone, as in Mitsuba. Throws
-/// std::runtime_error with the fault, without the name of a file.
+/// Decodes an image stored in any order of rows and columns, uncompressed or with either run-length encoding. XYZE is
+/// converted to linear Rec. 709. The exposure in the header is ignored, as in Mitsuba. Throws std::runtime_error; its
+/// message does not name the file.
 Image readRgbe(std::string_view bytes);
 
 }  // namespace lobe

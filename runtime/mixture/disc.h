@@ -1,8 +1,8 @@
 #pragma once
-// The equal-area map between the upper hemisphere and the unit disc (Lambert). formulas: Herholz et al. 2016, Eq. 7 in
-// its right form: y = ω_xy / sqrt(1 + ω_z).
+// The equal-area map between the upper hemisphere and the unit disc (Lambert's azimuthal projection; Herholz et al.
+// 2016, Eq. 7, corrected): y = ω_xy / sqrt(1 + ω_z).
 //
-// dω = 2 dA, so a density over the disc is twice the density over solid angle: p_ω = p_y / 2.
+// Since dω = 2 dA, a density over the disc is twice the density over solid angle: p_ω = p_y / 2.
 
 #include <algorithm>
 #include <cmath>
@@ -14,12 +14,12 @@ namespace lobe {
 using Vec2 = Eigen::Vector2f;
 using Vec3 = Eigen::Vector3f;
 
-/// Unit direction with z ≥ 0 to a point of the closed unit disc.
+/// Maps a unit direction with z ≥ 0 to a point of the closed unit disc.
 inline Vec2 toDisc(const Vec3& w) {
   return w.head<2>() / std::sqrt(1.0f + std::max(0.0f, w.z()));
 }
 
-/// Point of the closed unit disc to a unit direction with z ≥ 0.
+/// Maps a point of the closed unit disc to a unit direction with z ≥ 0.
 inline Vec3 fromDisc(const Vec2& y) {
   const float r2 = y.squaredNorm();
   const float scale = std::sqrt(std::max(0.0f, 2.0f - r2));
@@ -30,7 +30,7 @@ inline bool insideDisc(const Vec2& y) {
   return y.squaredNorm() < 1.0f;
 }
 
-/// cosθ of the direction that y stands for.
+/// cosθ of the direction fromDisc(y).
 inline float discCosine(const Vec2& y) {
   return std::max(0.0f, 1.0f - y.squaredNorm());
 }

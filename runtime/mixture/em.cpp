@@ -20,14 +20,14 @@ constexpr double kLogTwoPi = 1.8378770664093454836;
 constexpr std::size_t kLanes = 8;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// Eight components side by side, so that the loops over them vectorise: made ready for the E step, and what the M step
-// needs of them. Lanes without a component never get a share.
+// Eight components as a structure of arrays, so that the loops over them vectorise: precomputed terms for the E step
+// and sums for the M step. Padding lanes have zero weight and therefore zero responsibility.
 struct Block {
   using Lane = std::array<double, kLanes>;
   Lane logScale;  // log of weight / (2π sqrt|Σ|)
   Lane x{}, y{}, slope{}, along{}, across{};
-  Lane mass{}, sx{}, sy{}, sxx{}, sxy{}, syy{};  // moments about the present mean: narrow lobes lose no digits
-  Lane log{};                                    // density of the point at hand
+  Lane mass{}, sx{}, sy{}, sxx{}, sxy{}, syy{};  // moments about the current mean, which avoids cancellation
+  Lane log{};                                    // log densities at the current point
   std::array<float, kLanes> responsibility{};
 
   Block() { logScale.fill(-kInfinity); }
@@ -48,7 +48,7 @@ void Block::set(std::size_t k, const Gaussian& g) {
   logScale[k] = std::log(static_cast<double>(g.weight)) - kLogTwoPi - 0.5 * std::log(xx * rest);
 }
 
-// Returns the largest.
+// Computes the log densities at a point; returns the largest.
 double Block::logDensities(double px, double py) {
   for (std::size_t k = 0; k < kLanes; ++k) {
     const double dx = px - x[k], dy = py - y[k] - slope[k] * dx;
@@ -57,7 +57,7 @@ double Block::logDensities(double px, double py) {
   return *std::max_element(log.begin(), log.end());
 }
 
-// The densities relative to the largest of all; returns their sum.
+// Computes the densities relative to exp(largest); returns their sum.
 double Block::responsibilities(double largest) {
   for (std::size_t k = 0; k < kLanes; ++k) responsibility[k] = expNegative(static_cast<float>(log[k] - largest));
   return std::accumulate(responsibility.begin(), responsibility.end(), 0.0);
@@ -75,7 +75,7 @@ void Block::add(double px, double py, double scale) {
   }
 }
 
-// A component that no point belongs to keeps its shape and loses its weight.
+// A component without responsibility for any point keeps its mean and covariance; its weight becomes zero.
 void Block::maximise(std::size_t k, double totalWeight, double minVariance, Gaussian& g) const {
   g.weight = static_cast<float>(mass[k] / totalWeight);
   if (!(mass[k] > 0)) return;
@@ -86,8 +86,8 @@ void Block::maximise(std::size_t k, double totalWeight, double minVariance, Gaus
                               minVariance);
 }
 
-// Adds a point to all components by its responsibilities; returns the log of the mixture's density there. All is
-// relative to the largest term, so that points far from every component still count.
+// Adds a point to the sums of all components; returns the log of the mixture's density there. The densities are
+// computed relative to the largest, so that they do not underflow at points far from every component.
 double expectation(const WeightedPoint& point, std::vector<Block>& blocks) {
   double largest = -kInfinity, sum = 0;
   for (Block& b : blocks) largest = std::max(largest, b.logDensities(point.y.x(), point.y.y()));
@@ -96,7 +96,7 @@ double expectation(const WeightedPoint& point, std::vector<Block>& blocks) {
   return largest + std::log(sum);
 }
 
-// One sweep; returns the mean log-likelihood before it.
+// Performs one EM iteration; returns the mean log-likelihood before it.
 double sweep(std::span<const WeightedPoint> points, double totalWeight, double minVariance, Mixture& mixture,
              std::vector<Block>& blocks) {
   blocks.assign(blocks.size(), Block());

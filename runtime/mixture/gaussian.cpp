@@ -10,19 +10,19 @@ namespace lobe {
 
 namespace {
 
-// log of the determinant, of merged components too, in double: costs are small differences of large terms.
+// In double precision, because merge costs are small differences of large terms.
 double logDeterminant(const Covariance& c) {
   return std::log(static_cast<double>(c.xx) * c.yy - static_cast<double>(c.xy) * c.xy);
 }
 
-// The merge in double, for a cost free of the rounding of the stored covariance.
+// A merged component in double precision, so that its cost is not affected by rounding the covariance to floats.
 struct Moments {
   double weight, x, y, xx, xy, yy;
 };
 
 Moments mergedMoments(const Gaussian& a, const Gaussian& b) {
   const double weight = static_cast<double>(a.weight) + b.weight;
-  // Two components of weight zero merge into their midpoint.
+  // Two components of zero weight are merged at their midpoint.
   const double ta = weight > 0 ? a.weight / weight : 0.5, tb = 1 - ta;
   const double dx = static_cast<double>(a.meanX) - b.meanX, dy = static_cast<double>(a.meanY) - b.meanY;
   return {weight,
@@ -58,7 +58,7 @@ Vec2 sampleMixture(std::span<const Gaussian> mixture, float choice, const Vec2& 
   float total = 0;
   for (const Gaussian& g : mixture) total += g.weight;
   float left = choice * total;
-  // Rounding may leave a little at the end: then the last component that has weight is taken.
+  // If rounding leaves a remainder at the end, the last component with positive weight is chosen.
   std::size_t chosen = 0;
   for (std::size_t k = 0; k < mixture.size(); ++k) {
     if (mixture[k].weight <= 0) continue;
@@ -88,7 +88,7 @@ float mergeCost(const Gaussian& a, const Gaussian& b) {
   if (m.weight <= 0) return 0;
   const double cost = 0.5 * (m.weight * std::log(m.xx * m.yy - m.xy * m.xy) - a.weight * logDeterminant(a.cov) -
                              b.weight * logDeterminant(b.cov));
-  // The cost is a relative entropy, never negative but for rounding.
+  // The cost is a relative entropy, which only rounding can make negative.
   return static_cast<float>(std::max(0.0, cost));
 }
 

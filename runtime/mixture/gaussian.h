@@ -1,5 +1,5 @@
 #pragma once
-// A bivariate Gaussian in the plane of the disc, and small mixtures of them. Densities are over the plane's area (dA).
+// Bivariate Gaussians in the plane of the disc, and mixtures of them. Densities are with respect to area (dA).
 
 #include <cmath>
 #include <span>
@@ -11,14 +11,15 @@
 
 namespace lobe {
 
-/// A symmetric 2×2 matrix. Plain data: stored in caches as it is.
+/// A symmetric 2×2 matrix. Plain data with the layout of the cache files.
 struct Covariance {
   float xx, xy, yy;
-  /// In double, where both products are exact: for long thin lobes nearly all of their digits cancel.
+  /// Computed in double precision, in which both products are exact, because they nearly cancel for elongated
+  /// Gaussians.
   float determinant() const { return static_cast<float>(static_cast<double>(xx) * yy - static_cast<double>(xy) * xy); }
 };
 
-/// One weighted component. weight ≥ 0; covariance positive definite. Plain data: stored in caches as it is.
+/// A weighted component: weight ≥ 0, covariance positive definite. Plain data with the layout of the cache files.
 struct Gaussian {
   float weight;
   float meanX, meanY;
@@ -27,32 +28,33 @@ struct Gaussian {
 };
 static_assert(sizeof(Gaussian) == 24);
 
-/// A mixture owns its components; where only reading is needed a std::span<const Gaussian> is passed.
+/// An owning mixture. Functions that only read one take a std::span<const Gaussian>.
 using Mixture = std::vector<Gaussian>;
 
-/// N(y | mean, cov) without the weight. 0 where it underflows; never NaN for a positive definite covariance.
+/// N(y | mean, cov), without the weight. 0 on underflow; never NaN for a positive definite covariance.
 float normalPdf(const Gaussian& g, const Vec2& y);
 
-/// Σ weight · N: the weights need not sum to one.
+/// Σ weight · N(y). The weights need not sum to one.
 float mixturePdf(std::span<const Gaussian> mixture, const Vec2& y);
 
-/// A point of N(mean, cov) from u uniform in [0,1)² (Box–Muller and the Cholesky factor).
+/// Samples N(mean, cov) with u uniform in [0,1)² (Box–Muller transform and Cholesky factor).
 Vec2 sampleNormal(const Gaussian& g, const Vec2& u);
 
-/// Chooses a component in proportion to its weight with `choice` uniform in [0,1), then samples it. The mixture is not
-/// empty and its weights have a positive sum.
+/// Chooses a component in proportion to its weight with `choice` uniform in [0,1), then samples it. The sum of the
+/// weights must be positive.
 Vec2 sampleMixture(std::span<const Gaussian> mixture, float choice, const Vec2& u);
 
-/// The mixture turned about the disc's centre by the angle of the unit vector (cos, sin): μ' = Rμ, Σ' = RΣRᵀ.
+/// The Gaussian rotated about the disc's centre by the angle of the unit vector (cos, sin): μ' = Rμ, Σ' = RΣRᵀ.
 Gaussian rotated(const Gaussian& g, const Vec2& direction);
 
 /// The moment-preserving merge of two components (Herholz et al. 2016, Appendix B).
 Gaussian merged(const Gaussian& a, const Gaussian& b);
 
-/// Runnalls' cost of that merge (right form of Eq. 10): ½[(π_i+π_j) log|Σ_ij| − π_i log|Σ_i| − π_j log|Σ_j|] ≥ 0.
+/// Runnalls' cost of that merge, ½[(π_i+π_j) log|Σ_ij| − π_i log|Σ_i| − π_j log|Σ_j|] ≥ 0 (Herholz et al. 2016, Eq. 10,
+/// corrected).
 float mergeCost(const Gaussian& a, const Gaussian& b);
 
-/// Merges the cheapest pair while the running sum of costs stays ≤ threshold; returns the sum spent.
+/// Merges the cheapest pair of components repeatedly while the sum of the costs stays ≤ threshold; returns that sum.
 float reduce(Mixture& mixture, float threshold);
 
 }  // namespace lobe

@@ -17,8 +17,8 @@ double elevation(int index, int count) {
   return 0.5 * kPi * (0.5 * t + 0.5 * (1 - v * v * v));
 }
 
-// With v = 1 − t the spacing reads v³ + v = 2 − 4θ/π, rising in v: Newton's iteration from half the right side, which
-// is exact at both ends, has converged to a hundredth of any grid's step after four steps.
+// With v = 1 − t the spacing is v³ + v = 2 − 4θ/π. Newton's method starts from half the right-hand side, which is exact
+// at both ends; four iterations converge to within a hundredth of any grid's step.
 double invertedSpacing(double theta) {
   const double right = std::clamp(2 - 4 * theta / kPi, 0.0, 2.0);
   double v = 0.5 * right;
@@ -37,8 +37,8 @@ int nearestElevation(const Vec3& w, int count) {
   return best;
 }
 
-// ---- Spherical Fibonacci points. The count points of the upper hemisphere are the first half of the 2·count points of
-// the whole sphere, for which Keinert et al. 2015 is written.
+// ---- Spherical Fibonacci points. The points of the upper hemisphere are the first half of the 2·count points of the
+// whole sphere in Keinert et al. 2015, "Spherical Fibonacci Mapping".
 
 double fraction(double x) {
   return x - std::floor(x);
@@ -54,7 +54,7 @@ Vec3 fibonacciDirection(int index, int count) {
   return {static_cast<float>(sine * std::cos(phi)), static_cast<float>(sine * std::sin(phi)), static_cast<float>(z)};
 }
 
-// Keeps the nearest of the entries offered to it.
+// Finds the nearest of the entries offered to it.
 struct Nearest {
   const Vec3& w;
   int count;
@@ -66,8 +66,8 @@ struct Nearest {
   }
 };
 
-// The lattice of the points around one latitude, in (azimuth, height): the steps from a point to those whose index is
-// larger by two consecutive Fibonacci numbers, which are its nearest neighbours there.
+// The lattice that the points form near a latitude, in (azimuth, height). Its basis vectors are the steps from a point
+// to those whose indices are larger by two consecutive Fibonacci numbers, which are its nearest neighbours there.
 struct Lattice {
   double step[2][2];  // [which][azimuth, height]
 };
@@ -100,8 +100,8 @@ int nearestFibonacci(const Vec3& w, int count) {
   const double x = std::atan2(w.y(), w.x()), y = height - (1 - 0.5 / count);
   const double inverse = 1 / (a[0] * b[1] - a[1] * b[0]);
   const double ca = std::floor((x * b[1] - y * b[0]) * inverse), cb = std::floor((y * a[0] - x * a[1]) * inverse);
-  // The corners of the lattice cell hold the nearest point, but at the equator, where corners may belong to the lower
-  // hemisphere: a ring more is searched there.
+  // The nearest point is a corner of the lattice cell, except at the equator, where corners may lie in the lower
+  // hemisphere. One more ring of cells is searched there.
   const double reach = std::abs(a[1]) + std::abs(b[1]);
   const int ring = height < 2 * reach ? 1 : 0;
   for (int i = -ring; i <= 1 + ring; ++i) {

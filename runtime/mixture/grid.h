@@ -1,6 +1,7 @@
 #pragma once
-// The grids of directions that BRDF mixtures are fitted for: elevations for isotropic lobes, spherical Fibonacci points
-// for anisotropic ones. A pure function of kind, count and index, so that fitter and renderer agree by construction.
+// The grids of outgoing directions for which BRDF mixtures are fitted: elevations for isotropic lobes, spherical
+// Fibonacci points for anisotropic ones. A grid depends on its kind and count only, so that fitter and renderer always
+// agree.
 
 #include <cstdint>
 
@@ -14,12 +15,12 @@ struct DirectionGrid {
   GridKind kind = GridKind::elevation;
   int count = 0;  ///< ≥ 1
 
-  /// The unit direction of an entry, z > 0. Elevations lie in the plane y = 0, x ≥ 0, and are denser towards grazing:
-  /// θ = 90°·(t/2 + (1 − (1−t)³)/2) with t = (index + ½)/count, so that neither end is hit exactly.
+  /// The unit direction of an entry, z > 0. Elevations lie in the half-plane y = 0, x ≥ 0, and are denser towards
+  /// grazing angles: θ = 90°·(t/2 + (1 − (1−t)³)/2) with t = (index + ½)/count, so that 0° and 90° are excluded.
   Vec3 direction(int index) const;
 
-  /// The entry nearest to w (z ≥ 0, unit). Elevations: nearest in elevation, by inverting the spacing. Fibonacci:
-  /// nearest in angle among the upper-hemisphere points, in constant time (Keinert et al. 2015).
+  /// The index of the entry nearest to w (unit, z ≥ 0), in constant time: for elevations nearest in elevation, for
+  /// Fibonacci points nearest in angle (Keinert et al. 2015).
   int nearest(const Vec3& w) const;
 };
 

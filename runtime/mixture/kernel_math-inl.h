@@ -1,4 +1,4 @@
-// What the kernels are made of. Included once for each instruction set: no #pragma once.
+// Vectorised functions shared by the kernels. Included once per instruction set, hence no #pragma once.
 #if defined(LOBE_LANE_MATH_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef LOBE_LANE_MATH_INL_H
 #undef LOBE_LANE_MATH_INL_H
@@ -11,8 +11,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace lobe::HWY_NAMESPACE {
 
-/// 2^x for x ≤ 0 with a relative error below 2e-7 besides that of x itself; exactly 0 below −126, where floats stop
-/// being normal.
+/// 2^x for x ≤ 0 with a relative error below 2e-7, in addition to the error of x; exactly 0 below −126, the exponent of
+/// the smallest normal float.
 template <class D>
 HWY_INLINE hwy::HWY_NAMESPACE::Vec<D> exp2Negative(D d, hwy::HWY_NAMESPACE::Vec<D> x) {
   namespace hn = hwy::HWY_NAMESPACE;
@@ -21,7 +21,7 @@ HWY_INLINE hwy::HWY_NAMESPACE::Vec<D> exp2Negative(D d, hwy::HWY_NAMESPACE::Vec<
   const auto bounded = hn::Max(x, lowest);
   const auto whole = hn::NearestInt(bounded);
   const auto r = hn::Sub(bounded, hn::ConvertTo(d, whole));
-  // Interpolates at Chebyshev's nodes of |r| ≤ ½; in halves, which do not wait for one another.
+  // Interpolation polynomial at Chebyshev nodes of |r| ≤ ½, evaluated in independent parts (Estrin's scheme).
   const auto r2 = hn::Mul(r, r);
   const auto low = hn::MulAdd(hn::Set(d, 6.93147188e-1f), r, hn::Set(d, 1.00000008f));
   const auto middle = hn::MulAdd(hn::Set(d, 5.55035711e-2f), r, hn::Set(d, 2.40221075e-1f));
@@ -31,8 +31,8 @@ HWY_INLINE hwy::HWY_NAMESPACE::Vec<D> exp2Negative(D d, hwy::HWY_NAMESPACE::Vec<
   return hn::IfThenElseZero(hn::Gt(x, lowest), hn::Mul(p, power));
 }
 
-/// 1/x and 1/sqrt(x) for normal positive x, by the machine's 12 bits and a step of Newton's: a relative error below
-/// 5e-7, in a third of the time of a division or a square root.
+/// 1/x and 1/sqrt(x) for normal positive x, from the CPU's 12-bit approximation and one Newton step: relative error
+/// below 5e-7, in a third of the time of a division or square root.
 template <class D>
 HWY_INLINE hwy::HWY_NAMESPACE::Vec<D> reciprocal(D d, hwy::HWY_NAMESPACE::Vec<D> x) {
   namespace hn = hwy::HWY_NAMESPACE;

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <numbers>
 
-// Includes this file once for each instruction set.
+// Includes this file once per instruction set.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "runtime/mixture/kernels.cpp"
 #include <hwy/foreach_target.h>  // IWYU pragma: keep
@@ -17,7 +17,7 @@ namespace lobe::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// The columns of one set of lanes of the light.
+// The columns of pairs for one SIMD vector of the light's components, starting at `first`; returns their sums.
 template <class D>
 HWY_INLINE hn::Vec<D> pairColumns(D d, GaussiansView reflectance, float constant, GaussiansView light, int first,
                                   float* pairs) {
@@ -48,7 +48,7 @@ HWY_INLINE hn::Vec<D> pairColumns(D d, GaussiansView reflectance, float constant
   return sum;
 }
 
-// Makes running sums of the numbers; returns the last.
+// Replaces the values by their running sums; returns the last.
 HWY_INLINE float sumUp(float* values, int count) {
   const hn::CappedTag<float, kPaddingMultiple> d;
   auto sum = hn::Zero(d);
@@ -78,10 +78,10 @@ float pairMassesKernel(const GaussiansView& reflectance, float constant, const G
   return pairMassesBy(hn::CappedTag<float, kMaxVectorLanes>(), reflectance, constant, light, pairs, columns);
 }
 
-// Without branches that depend on chance: the machine would guess them wrong.
+// Without branches that depend on the random number, which would be mispredicted.
 PairIndex choosePairKernel(const float* pairs, const float* columns, int rows, int stride, float choice) {
   const hn::CappedTag<float, kPaddingMultiple> d;
-  float left = choice * columns[stride - 1];  // less than all
+  float left = choice * columns[stride - 1];  // less than the total
   int column = 0;
   for (int j = 0; j < stride; j += kPaddingMultiple)
     column += static_cast<int>(hn::CountTrue(d, hn::Le(hn::LoadU(d, columns + j), hn::Set(d, left))));
@@ -93,7 +93,7 @@ PairIndex choosePairKernel(const float* pairs, const float* columns, int rows, i
     sum += masses[std::ptrdiff_t{i} * stride];
     row += sum <= left ? 1 : 0;
   }
-  // Rounding may leave a little at the end: then the last pair that has mass is taken.
+  // If rounding leaves a remainder at the end, the last pair with positive mass is chosen.
   while (row == rows || !(masses[std::ptrdiff_t{row} * stride] > 0)) --row;
   return {row, column};
 }
@@ -148,7 +148,7 @@ Densities bothDensitiesKernel(const GaussiansView& reflectance, const GaussiansV
   return {reflectanceDensityAt(reflectance, x, y), lightDensityAt(light, x, y)};
 }
 
-/// A step's direction and length, for all lanes.
+/// The step of a Placement, broadcast to all lanes.
 template <class D>
 struct Step {
   Step(D d, const Placement& p)
@@ -156,7 +156,7 @@ struct Step {
   hn::Vec<D> x, y, squared;
 };
 
-// Of each mean in the disc the largest t ≤ 1 with |mean + t · step| ≤ 1; 1 for the others.
+// The largest t ≤ 1 with |mean + t · step| ≤ 1 for each mean inside the disc; 1 for means outside.
 template <class D>
 HWY_INLINE hn::Vec<D> largestStep(D d, hn::Vec<D> x, hn::Vec<D> y, const Step<D>& step) {
   const auto zero = hn::Zero(d), one = hn::Set(d, 1.0f);
@@ -183,7 +183,7 @@ HWY_INLINE void placeBy(D d, GaussiansView mixture, const Placement& p, float* o
     const auto x = hn::MulAdd(t, step.x, oldX), y = hn::MulAdd(t, step.y, oldY);
     to(GaussianField::x, hn::NegMulAdd(sine, y, hn::Mul(cosine, x)));
     to(GaussianField::y, hn::MulAdd(cosine, y, hn::Mul(sine, x)));
-    // Σ = xx (1, slope)(1, slope)ᵀ + d (0, 1)(0, 1)ᵀ: both vectors are turned, and |Σ| stays.
+    // Σ = xx (1, slope)(1, slope)ᵀ + d (0, 1)(0, 1)ᵀ: both vectors are rotated, and |Σ| does not change.
     const auto slope = hn::Mul(hn::Set(d, p.mirrorX * p.mirrorY), from(GaussianField::slope));
     const auto ux = hn::NegMulAdd(sine, slope, cosine), uy = hn::MulAdd(cosine, slope, sine);
     const auto wide = from(GaussianField::xx), narrow = from(GaussianField::conditional);
@@ -205,7 +205,7 @@ HWY_INLINE void placeBy(D d, GaussiansView mixture, const Placement& p, float* o
 }
 
 void placeMixtureKernel(const GaussiansView& mixture, const Placement& placement, float* out, int stride, int first) {
-  // NOLINTNEXTLINE(bugprone-branch-clone): they are the same only for targets of four lanes
+  // NOLINTNEXTLINE(bugprone-branch-clone): the branches are equal only for targets with four lanes
   if (mixture.count <= kPaddingMultiple)
     placeBy(hn::CappedTag<float, kPaddingMultiple>(), mixture, placement, out, stride, first);
   else

@@ -5,13 +5,13 @@
 namespace lobe {
 namespace {
 
-/// The unit vector of wo's azimuth; any where there is none.
+/// The unit vector of wo's azimuth; the x axis if wo is the normal.
 Vec2 azimuthOf(const Vec3& wo) {
   const float length = wo.head<2>().norm();
   return length > 0 ? Vec2(wo.head<2>() / length) : Vec2::UnitX();
 }
 
-/// The largest t ≤ 1 with |mean + t·step| ≤ 1 for a mean in the disc; 1 for others.
+/// The largest t ≤ 1 with |mean + t·step| ≤ 1 for a mean inside the disc; 1 for a mean outside.
 float largestStep(const Vec2& mean, const Vec2& step) {
   const float room = 1.0f - mean.squaredNorm();
   const float length2 = step.squaredNorm();
@@ -45,7 +45,7 @@ std::span<Gaussian> alignMixture(const Alignment& alignment, std::span<const Gau
   }
   const Vec2 step = reference - toDisc(wo);
   for (Gaussian& g : out) {
-    // Each by itself: a broad component at the edge, which fits a tail, must not keep the lobe from moving.
+    // Shortened per component: a broad component at the edge, which fits a tail, must not stop the others.
     const float t = largestStep(g.mean(), step);
     g.meanX += t * step.x();
     g.meanY += t * step.y();
@@ -58,7 +58,7 @@ Placement placementOf(const Alignment& alignment, const Vec3& wo) {
   const Vec2& reference = alignment.reference;
   const Vec2 to = toDisc(wo);
   if (alignment.kind == GridKind::elevation) {
-    // At the azimuth 0 the step is along x; turning comes last.
+    // The step is along x at azimuth 0; the rotation to wo's azimuth is applied last.
     const Vec2 azimuth = azimuthOf(wo);
     p.stepX = reference.x() - to.norm();
     p.cosine = azimuth.x();

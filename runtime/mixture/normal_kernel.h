@@ -1,6 +1,5 @@
 #pragma once
-// The one place where the bivariate normal density is written for the inner loops, so that a sampler's pair weights and
-// its density come from the same numbers.
+// The bivariate normal density for inner loops, used for both the weights of pairs and densities so that they agree.
 
 #include <cmath>
 #include <numbers>
@@ -10,8 +9,8 @@
 
 namespace lobe {
 
-/// N((dx, dy) | 0, cov). By the Cholesky factor: stable for long thin lobes, where the terms of the adjugate's
-/// quadratic form cancel. Loops over it vectorise.
+/// N((dx, dy) | 0, cov), by the Cholesky factor. This is accurate for elongated Gaussians, for which the terms of the
+/// quadratic form with the adjugate cancel. Loops over this function vectorise.
 inline float centredNormal(float dx, float dy, const Covariance& cov) {
   const float det = cov.determinant();
   const float inverse = 1.0f / cov.xx;

@@ -8,7 +8,7 @@ void packGaussian(const Gaussian& g, float* data, int stride, int k) {
   const auto put = [&](GaussianField f, double value) {
     data[static_cast<int>(f) * stride + k] = static_cast<float>(value);
   };
-  // In double: of long thin lobes nearly all digits of the determinant cancel.
+  // In double precision, because the terms of the determinant nearly cancel for elongated Gaussians.
   const double xx = g.cov.xx, xy = g.cov.xy, yy = g.cov.yy;
   const double determinant = xx * yy - xy * xy;
   put(GaussianField::x, g.meanX);

@@ -1,5 +1,5 @@
 #pragma once
-// From Gaussians to lanes and back, to the bit.
+// Conversion of Gaussians to a structure of arrays (SoA) and back, without loss.
 
 #include <array>
 #include <span>
@@ -9,37 +9,37 @@
 
 namespace lobe {
 
-/// The number of lanes that `count` components take.
+/// The number of components including padding lanes: `count` rounded up to a multiple of kPaddingMultiple.
 constexpr int paddedCount(int count) {
   return (count + kPaddingMultiple - 1) / kPaddingMultiple * kPaddingMultiple;
 }
 
-/// Writes all components, and dead ones of weight 0 in the other lanes up to stride. data: kGaussianFields · stride
-/// floats; stride ≥ the number of components.
+/// Writes all components, and zero-weight padding up to the stride. data: kGaussianFields · stride floats; stride ≥ the
+/// number of components.
 void packGaussians(std::span<const Gaussian> mixture, float* data, int stride);
 
-/// Component k, as it was packed.
+/// Component k, bit for bit as it was packed.
 Gaussian gaussianAt(const GaussiansView& lanes, int k);
 
 /// All components of the view.
 Mixture unpackGaussians(const GaussiansView& lanes);
 
-/// Room for up to `capacity` components, filled from the front. What lies behind them is undefined.
+/// Storage for up to `capacity` components. The content behind the last component is undefined.
 template <int capacity>
 class GaussianStore {
  public:
-  /// Kernels write whole sets of lanes.
+  /// Includes padding lanes, because kernels write whole SIMD vectors.
   static constexpr int kStride = paddedCount(capacity) + kMaxVectorLanes;
 
   int count() const { return count_; }
   int room() const { return capacity - count_; }
   GaussiansView view() const { return {data_.data(), kStride, count_}; }
 
-  /// For kernels that append: where field f of component k is to go is data()[f·kStride + k].
+  /// For kernels that append components: field f of component k is data()[f·kStride + k]. Call grow afterwards.
   float* data() { return data_.data(); }
   void grow(int by) { count_ += by; }
 
-  /// count() < capacity.
+  /// Appends a component. Requires room() > 0.
   void add(const Gaussian& g);
 
  private:
@@ -47,7 +47,7 @@ class GaussianStore {
   alignas(32) std::array<float, std::size_t{kGaussianFields} * kStride> data_;
 };
 
-/// Writes one component to lane k.
+/// Writes one component as number k.
 void packGaussian(const Gaussian& g, float* data, int stride, int k);
 
 template <int capacity>

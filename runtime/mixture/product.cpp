@@ -7,11 +7,11 @@
 namespace lobe {
 namespace {
 
-/// (cos 2πu, sin 2πu) for u in [0,1), to 2e-7. Without branches that depend on u, which the machine would guess wrong.
+/// (cos 2πu, sin 2πu) for u in [0,1), with an error below 2e-7. Without branches on u, which would be mispredicted.
 Vec2 onCircle(float u) {
   const int quarter = static_cast<int>(4.0f * (u + 0.125f));
   const float t = 2.0f * std::numbers::pi_v<float> * (u - 0.25f * static_cast<float>(quarter)), t2 = t * t;
-  // Taylor on |t| ≤ π/4.
+  // Taylor polynomials on |t| ≤ π/4.
   const float sine = t * (1.0f + t2 * (-1.0f / 6 + t2 * (1.0f / 120 + t2 * (-1.0f / 5040 + t2 * (1.0f / 362880)))));
   const float cosine = 1.0f + t2 * (-1.0f / 2 + t2 * (1.0f / 24 + t2 * (-1.0f / 720 + t2 * (1.0f / 40320))));
   const std::array<float, 2> axes{cosine, sine};
@@ -20,12 +20,12 @@ Vec2 onCircle(float u) {
           axes[1 - odd] * static_cast<float>(1 - (quarter & 2))};
 }
 
-/// Two independent draws of N(0, 1) (Box–Muller).
+/// Two independent samples of N(0, 1) (Box–Muller transform).
 Vec2 standardNormal(const Vec2& u) {
   return std::sqrt(-2.0f * std::log(1.0f - u.x())) * onCircle(u.y());
 }
 
-/// One component by the numbers that a product is made of; d is the variance of y at a given x.
+/// A component by the parameters that a product needs; d is the variance of y for given x.
 struct Factor {
   float x, y, slope, xx, d;
   Factor(const GaussiansView& mixture, int k) {
@@ -36,13 +36,13 @@ struct Factor {
   float ridge(float px) const { return y + slope * (px - x); }
 };
 
-/// A point of the normalised product of two components. With the Cholesky factors the product's density of x, then that
-/// of y at this x, are products of Gaussians of one variable: all sums are of positive terms, so that floats will do.
+/// Samples the normalised product of two components. With Cholesky factors, the product's density of x, and that of y
+/// given x, are products of univariate Gaussians. All sums have positive terms, so that single precision suffices.
 Vec2 samplePair(const Factor& one, const Factor& two, const Vec2& normal) {
   const float apart = two.x - one.x, bend = one.slope - two.slope, across = one.d + two.d;
   const float wide = one.xx * two.xx;
   const float determinant = (one.xx + two.xx) * across + wide * (bend * bend);
-  const float gap = one.y - two.ridge(one.x);  // between the ridges at one.x
+  const float gap = one.y - two.ridge(one.x);  // distance of the conditional means of y at one.x
   const float inverse = 1.0f / determinant;
   const float shift = (one.xx * across * apart - wide * bend * gap) * inverse;
   const float x = one.x + shift + std::sqrt(wide * across * inverse) * normal.x();
@@ -65,7 +65,7 @@ Vec2 sampleGaussians(const GaussiansView& mixture, float choice, const Vec2& u) 
   float total = 0;
   for (int k = 0; k < mixture.count; ++k) total += weights[k];
   float left = choice * total;
-  // Rounding may leave a little at the end: then the last component that has weight is taken.
+  // If rounding leaves a remainder at the end, the last component with positive weight is chosen.
   int chosen = 0;
   for (int k = 0; k < mixture.count; ++k) {
     if (!(weights[k] > 0)) continue;

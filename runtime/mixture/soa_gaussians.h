@@ -1,30 +1,31 @@
 #pragma once
-// Gaussians side by side: a field of all components is one run of floats, so that one load feeds one set of lanes. No
-// Eigen in here: the kernels are compiled for several instruction sets.
+// Gaussians as a structure of arrays (SoA): each field of all components is contiguous, so that one load fills a SIMD
+// register. Does not use Eigen, because the kernels are compiled for several instruction sets.
 
 #include <cstddef>
 
 namespace lobe {
 
-/// What is kept of a component of weight π, mean (x, y) and covariance Σ = (xx, xy, yy). With its Cholesky factor,
+/// The fields of a component of weight π, mean (x, y) and covariance Σ = (xx, xy, yy). By its Cholesky factor,
 ///   π N(p) = scale · 2^(along dx² + across (dy − slope dx)²),  dx = p.x − x, dy = p.y − y,
-/// where slope = xy/xx and, with conditional d = |Σ|/xx, the variance of y at a given x, along = −kHalfLog2e/xx, across
-/// = −kHalfLog2e/d, scale = π/(2π sqrt|Σ|). All but xx, xy, yy and weight are what the density needs.
+/// where slope = xy/xx, along = −kHalfLog2e/xx, across = −kHalfLog2e/d and scale = π/(2π sqrt|Σ|); d = |Σ|/xx
+/// ("conditional") is the variance of y for given x. The first six fields suffice for the density.
 enum class GaussianField { x, y, slope, along, across, scale, xx, xy, conditional, weight, yy };
 inline constexpr int kGaussianFields = 11;
 
-/// Lanes come in multiples of this many.
+/// The stride of a view is a multiple of this.
 inline constexpr int kPaddingMultiple = 4;
-/// Kernels may read and write this many lanes at once.
+/// Largest number of components that kernels read or write at once.
 inline constexpr int kMaxVectorLanes = 8;
 
-/// Largest component counts of the two factors of a product; more is refused when a cache or record is made.
+/// Largest numbers of components of the two factors of a product. Larger ones are refused when a cache or record is
+/// created.
 inline constexpr int kMaxReflectanceComponents = 32;
 inline constexpr int kMaxLightComponents = 8;
 
 inline constexpr float kHalfLog2e = 0.72134752f;
 
-/// Components to read. Field f of component k is at data[f·stride + k]; stride is a multiple of kPaddingMultiple.
+/// A read-only view. Field f of component k is data[f·stride + k]; stride is a multiple of kPaddingMultiple.
 struct GaussiansView {
   const float* data;
   int stride;

@@ -45,20 +45,21 @@ float backgroundPdf(const Vec2& y) {
   return 2.0f * kInvPi * discCosine(y);
 }
 
-// The first index at which the running sum of the shares exceeds `target`; the last with a share if rounding hides it.
-std::size_t choose(std::span<const double> fractions, double target) {
+// The first index at which the running sum of the weights exceeds `target`; the last one with positive weight if
+// rounding prevents that.
+std::size_t choose(std::span<const double> weights, double target) {
   std::size_t last = 0;
-  for (std::size_t i = 0; i < fractions.size(); ++i) {
-    if (!(fractions[i] > 0)) continue;
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    if (!(weights[i] > 0)) continue;
     last = i;
-    if (target < fractions[i]) break;
-    target -= fractions[i];
+    if (target < weights[i]) break;
+    target -= weights[i];
   }
   return last;
 }
 
-// A step that visits every one of n points once, neighbours in the given order far apart: on-line EM forgets, and from
-// points sorted by direction it would keep the last directions only.
+// A stride that visits each of n points once and separates points that are adjacent in the given order. On-line EM
+// discounts earlier points; with points sorted by direction, it would otherwise fit mainly the last directions.
 std::size_t scatteringStride(std::size_t n) {
   auto stride = static_cast<std::size_t>(static_cast<double>(n) * (std::numbers::phi - 1));
   while (std::gcd(stride, n) > 1) ++stride;
@@ -67,24 +68,24 @@ std::size_t scatteringStride(std::size_t n) {
 
 }  // namespace
 
-// The state of one sweep, taken from and put back into the mixture's. Components lie side by side, padded with dead
-// ones of weight 0 to a fixed number of lanes, so that the loops over them vectorise. No allocation.
+// The state of one sweep, copied from the mixture and stored back at its end. Components are a structure of arrays of
+// fixed size with zero-weight padding, so that the loops over them vectorise. Does not allocate.
 template <int lanes>
 class StepwiseEm::Sweep {
  public:
   explicit Sweep(const StepwiseEm& em);
   void store(StepwiseEm& em) const;
 
-  /// Takes one point in with the step η; returns the density at it before.
+  /// Adds one point with step size η; returns the mixture's density there before.
   float add(const WeightedPoint& point, double step);
-  /// The M step with the priors' counterweight n.
+  /// Performs the M step for n effective samples, against which the priors are weighed.
   void maximise(double n);
 
  private:
   void prepare();
   Covariance covariance(int k, double n) const;
 
-  // Of the E step: means, the inverse Cholesky factor's parts, and (1−u) π / (2π sqrt|Σ|).
+  // For the E step: means, parts of the inverse Cholesky factor, and scale = (1−u) π / (2π sqrt|Σ|).
   alignas(64) std::array<float, lanes> x_{};
   std::array<float, lanes> y_{}, slope_{}, along_{}, across_{}, scale_{};
   std::array<double, lanes> g_{}, sx_{}, sy_{}, cxx_{}, cxy_{}, cyy_{};
@@ -147,7 +148,7 @@ float StepwiseEm::Sweep<lanes>::add(const WeightedPoint& point, double step) {
   const float total = sum + flat;
   const double keep = 1 - step, weight = step * point.weight;
   totalWeight_ = keep * totalWeight_ + weight;
-  // Where every density underflows the point counts for the background.
+  // If all densities underflow, the point is attributed to the background.
   const double scale = total > 0 ? weight / total : 0;
   backgroundWeight_ = keep * backgroundWeight_ + (total > 0 ? scale * flat : weight);
   const double x = px, y = py, xx = x * x, xy = x * y, yy = y * y;
@@ -163,7 +164,7 @@ float StepwiseEm::Sweep<lanes>::add(const WeightedPoint& point, double step) {
   return total;
 }
 
-// Σ_k = (b I + n V_k)/(a + n u_k). V_k is the scatter over the weight of all points.
+// Σ_k = (b I + n V_k)/(a + n u_k), where V_k is the scatter of the component divided by the weight of all points.
 template <int lanes>
 Covariance StepwiseEm::Sweep<lanes>::covariance(int k, double n) const {
   const double mx = sx_[k] / g_[k], my = sy_[k] / g_[k], perWeight = n / totalWeight_;
@@ -175,7 +176,7 @@ Covariance StepwiseEm::Sweep<lanes>::covariance(int k, double n) const {
 
 template <int lanes>
 void StepwiseEm::Sweep<lanes>::maximise(double n) {
-  // The mode under a Dirichlet prior over all K + 1 weights; Gaussians' weights are then relative to their sum.
+  // The MAP estimate under a Dirichlet prior over all K + 1 weights. The Gaussians' weights are relative to their sum.
   const double pseudo = kPriorV, perWeight = n / totalWeight_;
   const double all = n + count_ * pseudo + kBackgroundPrior;
   background_ = static_cast<float>((backgroundWeight_ * perWeight + kBackgroundPrior) / all);
@@ -183,7 +184,7 @@ void StepwiseEm::Sweep<lanes>::maximise(double n) {
   for (int k = 0; k < count_; ++k) gaussianWeight += g_[k] * perWeight + pseudo;
   for (int k = 0; k < count_; ++k) {
     gaussians_[k].weight = static_cast<float>((g_[k] * perWeight + pseudo) / gaussianWeight);
-    if (!(g_[k] > 1e-12 * totalWeight_)) continue;  // underflow: it keeps its shape
+    if (!(g_[k] > 1e-12 * totalWeight_)) continue;  // underflow: mean and covariance are kept
     gaussians_[k].meanX = static_cast<float>(sx_[k] / g_[k]);
     gaussians_[k].meanY = static_cast<float>(sy_[k] / g_[k]);
     gaussians_[k].cov = covariance(k, n);
@@ -195,7 +196,7 @@ StepwiseEm::StepwiseEm(int components) : background_(kInitialBackground) {
   if (components < 1 || components > kMaxIlluminationComponents)
     throw std::runtime_error("the number of components of an illumination mixture must be between 1 and 16");
   const Covariance wide{kInitialVariance, 0.0f, kInitialVariance};
-  // On a spiral that covers the disc evenly.
+  // Means on a spiral that covers the disc uniformly.
   constexpr float kGoldenAngle = 2.39996323f;
   const auto count = static_cast<float>(components);
   for (int k = 0; k < components; ++k) {
@@ -206,12 +207,12 @@ StepwiseEm::StepwiseEm(int components) : background_(kInitialBackground) {
   statistics_.resize(gaussians_.size());
 }
 
-// Chooses the means among the points, each in proportion to weight × squared distance from those chosen before
-// (k-means++, Arthur and Vassilvitskii 2007). Of the starts tried it is the one that no order of points and no
-// magnitude of weights led astray. Components that no point is left for stay where the constructor put them.
+// Initialises the means by k-means++ (Arthur and Vassilvitskii 2007): each is a point chosen in proportion to weight ×
+// squared distance from the means chosen before. Of the initialisations tried, this is the only one that worked for all
+// orders of points and magnitudes of weights. If no points are left, the remaining components keep their initial means.
 void StepwiseEm::spread(std::span<const WeightedPoint> points) {
   Rng rng(kStartSeed);
-  // Weight × squared distance to the nearest mean; at first just the weight.
+  // Weight × squared distance to the nearest mean; only the weight for the first mean.
   std::vector<double> pull;
   pull.reserve(points.size());
   for (const WeightedPoint& p : points) pull.push_back(counts(p) ? p.weight : 0.0);
@@ -251,7 +252,7 @@ void StepwiseEm::update(std::span<const WeightedPoint> points) {
   evidence_ = after;
 }
 
-// Returns the weighted mean of the log-likelihood as it was before each point was taken in.
+// Returns the weighted mean of the log-likelihood of each point before it was added.
 double StepwiseEm::sweep(std::span<const WeightedPoint> points, double evidenceBefore, double evidenceAfter) {
   const auto run = [&]<int lanes>() {
     Sweep<lanes> state(*this);

@@ -18,7 +18,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kAlike = 1e-3;
 
-/// All that the headers say, in the same order for every cache.
+/// The header fields of a cache, in the same order for every cache.
 std::vector<std::pair<std::string, std::string>> fieldsOf(const LobeCache& cache) {
   const LobeCacheInfo& info = cache.info();
   const FitSettings& s = info.settings;
@@ -53,7 +53,7 @@ bool sameBytes(std::span<const T> a, std::span<const T> b) {
 bool sameRecord(const LobeCache& a, const LobeCache& b, const RecordPair& pair) {
   CacheRecord first = recordOf(a, pair.a), second = recordOf(b, pair.b);
   const bool sameMixture = sameBytes(a.components(first), b.components(second));
-  // Where its components lie is no property of a record.
+  // The position of the components in the file is not a property of the record.
   first.first = second.first = 0;
   return sameMixture && sameBytes(std::span<const CacheRecord>(&first, 1), std::span<const CacheRecord>(&second, 1));
 }
@@ -136,13 +136,13 @@ void printDifference(const CacheDifference& d, const CachePair& caches, std::FIL
   if (!d.sameLobe) fmt::print(out, "These are different lobes.\n\n");
   printFields(d, out);
   if (!d.sameGrid)
-    fmt::print(out, "The grids differ: beside each record of A is the one of B that serves its direction.\n\n");
+    fmt::print(out, "The grids differ: each record of A is paired with the record of B that serves its direction.\n\n");
   printRecordPairs(d, caches, out);
   const LobeCacheInfo &a = caches.a.info(), &b = caches.b.info();
   printReports({{"A", "A " + a.summary, {}, summarise(caches.a)}, {"B", "B " + b.summary, {}, summarise(caches.b)}},
                false, out);
   fmt::print(out,
-             "\nOf {} records of A, by NEV: B is better in {}, worse in {}, alike in {} ({} the same to the bit)\n",
+             "\nOf {} records of A, compared by NEV: B is better in {}, worse in {}, equal in {} ({} are identical)\n",
              d.records.size(), d.better, d.worse, d.alike, std::ranges::count_if(d.records, &RecordPair::same));
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// What differs between two caches.
+// Comparison of two BRDF caches, for lobedump --diff.
 
 #include <filesystem>
 #include <string>
@@ -11,41 +11,42 @@
 
 namespace lobe {
 
-/// Something that the headers say, by the name that lobedump --json gives it.
+/// A header field that differs, with the name that it has in lobedump --json.
 struct FieldDifference {
   std::string name, a, b;
 };
 
-/// A record of A and the one of B for the same direction, by index; on other grids, the one of B that is nearest.
+/// Indices of a record of A and of the record of B that serves its direction.
 struct RecordPair {
   int a, b;
-  bool same;  ///< all numbers and components are
+  bool same;  ///< whether all fields and components are equal
 };
 
 struct CacheDifference {
-  bool equal = false;     ///< the same content, byte for byte
-  bool sameLobe = false;  ///< the keys are equal
+  bool equal = false;     ///< whether the contents are equal byte for byte
+  bool sameLobe = false;  ///< whether the keys are equal
   bool sameGrid = false;
-  std::vector<FieldDifference> fields;  ///< those that differ
-  std::vector<RecordPair> records;      ///< a pair for every record of A
-  /// Records of A whose partner needs fewer samples, more, or as many: 1 + NEV, equal within a thousandth.
-  /// None of them where a record is left to the BSDF.
+  std::vector<FieldDifference> fields;  ///< the fields that differ
+  std::vector<RecordPair> records;      ///< one pair for every record of A
+  /// Numbers of pairs in which 1 + NEV of B is lower, higher, or equal (within 0.1 %). A pair is not counted if one of
+  /// its records has no mixture.
   int better = 0, worse = 0, alike = 0;
 };
 
 CacheDifference compareCaches(const LobeCache& a, const LobeCache& b);
 
-/// Two caches and where they were found.
+/// Two caches and their paths.
 struct CachePair {
   const LobeCache& a;
   const LobeCache& b;
   std::filesystem::path pathA, pathB;
 };
 
-/// For people: fields, a row for every record that differs, the sums. One line when the two are equal.
+/// Prints the fields that differ, a row for every pair of different records, and summaries; one line if the caches are
+/// equal.
 void printDifference(const CacheDifference& difference, const CachePair& caches, std::FILE* out);
 
-/// The same, with every record.
+/// The same as JSON, with all pairs of records.
 nlohmann::ordered_json toJson(const CacheDifference& difference, const CachePair& caches);
 
 }  // namespace lobe

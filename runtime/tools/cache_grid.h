@@ -1,5 +1,5 @@
 #pragma once
-// The directions of a cache's records.
+// Outgoing directions of the records of a BRDF cache.
 
 #include <cmath>
 #include <numbers>
@@ -17,12 +17,12 @@ inline const char* gridName(const DirectionGrid& grid) {
   return grid.kind == GridKind::elevation ? "elevation" : "fibonacci";
 }
 
-/// The direction that a record was fitted for.
+/// The direction for which a record was fitted.
 inline Vec3 directionOf(const LobeCache& cache, std::size_t record) {
   return gridOf(cache).direction(static_cast<int>(cache.records()[record].entry));
 }
 
-/// In degrees, the elevation from the normal.
+/// In degrees; the elevation is measured from the normal.
 struct Angles {
   double elevation, azimuth;
 };

@@ -12,11 +12,11 @@
 namespace lobe {
 namespace {
 
-// A lobe is looked at closely when this share of the disc shows it.
+// Largest half-width of an enlarged view; larger lobes are shown on the whole disc.
 constexpr float kCloseView = 0.5f;
 constexpr float kMargin = 1.1f;
 
-/// A record, its lobe when there is one, and the densities over the disc of wi that are drawn.
+/// A record, its lobe (may be null), and the plotted densities over the disc of wi.
 class Subject {
  public:
   Subject(const LobeCache& cache, int index, const Lobe* lobe)
@@ -33,7 +33,7 @@ class Subject {
     const Vec3 wi = fromDisc(y);
     return 2 * lobe_->eval(wo_, wi) * wi.z() / record_.albedo;
   }
-  /// Target over the density of the grade; 1 where there is neither.
+  /// Target over the graded density; 1 where both are zero.
   double ratio(const Vec2& y) const {
     const double f = target(y);
     const double p = kGradedBsdfFraction * 2 * lobe_->pdf(wo_, fromDisc(y)) + (1 - kGradedBsdfFraction) * fit(y);
@@ -53,12 +53,12 @@ class Subject {
   std::uint32_t samples_;
 };
 
-// ---- What part of the disc to show
+// ---- View
 
 using Box = Eigen::AlignedBox2f;
 
-// A component belongs to the lobe, and does not only hold up its tails, when its peak is this share of the fit's; a
-// point when its value is this share of the target's.
+// A component belongs to the visible lobe, and not only to its tails, if its peak is at least this fraction of the peak
+// of the fit; a point belongs to it if its value is at least this fraction of the peak of the target.
 constexpr double kLobeFraction = 0.01;
 
 double peakAtMeans(std::span<const Gaussian> mixture, const std::function<double(const Vec2&)>& density) {
@@ -68,7 +68,7 @@ double peakAtMeans(std::span<const Gaussian> mixture, const std::function<double
   return peak;
 }
 
-/// Three standard deviations of every component of the lobe, however narrow.
+/// Bounding box of three standard deviations around every component of the lobe, however narrow.
 Box boxOfFit(std::span<const Gaussian> mixture) {
   const double peak = peakAtMeans(mixture, [&](const Vec2& y) { return mixturePdf(mixture, y); });
   Box box;
@@ -80,7 +80,7 @@ Box boxOfFit(std::span<const Gaussian> mixture) {
   return box;
 }
 
-/// A fit that is elsewhere must not hide the target.
+/// Bounding box of the target, which must be in view even if the fit misses it.
 Box boxOfTarget(const Subject& subject) {
   const Panel whole{0, 0, {}};
   std::vector<std::pair<Vec2, double>> values;

@@ -1,10 +1,10 @@
 #pragma once
-// Records of a cache as pictures over the disc of wi: target, fit and ratio, a row each.
+// Plots of the records of a BRDF cache over the disc of wi, one row of panels (target, fit, ratio) for each record.
 //
-// Target: ρ cosθ / albedo. Fit: G cosθ / ∫ G cosθ dA. Both are densities over the disc on one logarithmic scale that
-// ends kPlotDecades below the larger of their peaks. Ratio: target over the defensive density of 0.1 BSDF and 0.9 fit
-// that grades are of, on a diverging scale from 1/kPlotRatio (blue: drawn too often) over 1 (white) to kPlotRatio (red:
-// too seldom). x is to the right and y up; the disc's edge is the horizon.
+// Target: ρ cosθ / albedo. Fit: G cosθ / ∫ G cosθ dA. Both are densities over the disc, on one logarithmic scale that
+// ends kPlotDecades below the larger of their peaks. Ratio: target over the graded density (0.1 BSDF + 0.9 fit), on a
+// diverging scale from 1/kPlotRatio (blue: sampled too often) over 1 (white) to kPlotRatio (red: sampled too rarely).
+// x points right and y up; the edge of the disc is the horizon.
 
 #include <optional>
 #include <span>
@@ -22,22 +22,22 @@ inline constexpr double kPlotRatio = 10;
 
 struct PlotRow {
   int record;
-  PlotView view;                 ///< the whole disc, or about the lobe where that is small
-  double peak;                   ///< where the scale of target and fit ends
-  std::optional<Quality> grade;  ///< only with the lobe at hand
+  PlotView view;                 ///< the whole disc, or an enlarged view of a small lobe
+  double peak;                   ///< upper end of the scale of target and fit
+  std::optional<Quality> grade;  ///< only if the lobe is available
 };
 
 struct Plot {
   Raster raster;
-  std::vector<PlotRow> rows;  ///< from the top
+  std::vector<PlotRow> rows;  ///< from top to bottom
 };
 
-/// Panels of target, fit and ratio for each of the records, which have components, or of the fit alone when lobe is
-/// null. The lobe is the cache's. Over the fit lie the ellipses of one standard deviation of all components; the point
-/// of the worst f/p is ringed in all panels, at their border where it is out of view.
+/// Draws target, fit and ratio of the records, or only the fit if lobe is null. All records must have components, and
+/// lobe must be the one that the cache was fitted to. The fit shows the one-standard-deviation ellipses of all
+/// components. A ring marks the point of the worst f/p in all panels, at their border if the point is out of view.
 Plot plotRecords(const LobeCache& cache, std::span<const int> records, const Lobe* lobe);
 
-/// At most `rows` of `count` records, evenly from first to last.
+/// Indices of up to `rows` of `count` records, evenly spaced from the first to the last.
 std::vector<int> spreadRecords(int count, int rows);
 
 }  // namespace lobe

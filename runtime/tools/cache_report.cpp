@@ -177,7 +177,7 @@ void printHeader(const LobeCache& cache, const std::filesystem::path& path, std:
   fmt::print(out, "  fit       {}, {} components, {} samples, reduction {}, quality {}, revision {}\n",
              nameOf(s.method), s.components, s.samples, s.reduction, s.quality, s.revision);
   fmt::print(out, "  grid      {}, {} directions, {}\n", gridName(grid), grid.count,
-             s.fixedGrid ? "a record each" : fmt::format("served by {} records", cache.records().size()));
+             s.fixedGrid ? "one record each" : fmt::format("served by {} records", cache.records().size()));
 }
 
 void printRecords(const LobeCache& cache, std::FILE* out) {

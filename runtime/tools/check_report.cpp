@@ -24,7 +24,7 @@ void printJson(const std::filesystem::path& scene, const SceneCheck& check, std:
                                     {"faults", faults},
                                     {"warnings", check.warnings},
                                     {"notes", check.notes}};
-  // Names in files need not be UTF-8.
+  // Names in scene files may be invalid UTF-8.
   fmt::print(out, "{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
 }
 

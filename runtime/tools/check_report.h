@@ -1,5 +1,5 @@
 #pragma once
-// What --check prints.
+// The report that --check prints.
 
 #include <cstdio>
 #include <filesystem>
@@ -8,8 +8,8 @@
 
 namespace lobe {
 
-/// Reads the scene as readScene does and prints all that it finds, as lines or as one JSON object. Throws
-/// std::runtime_error that counts the faults when readScene with the same options would refuse the scene.
+/// Reads the scene as readScene does and prints all faults, warnings and notes, as text or as one JSON object. Throws
+/// std::runtime_error with the number of faults if readScene with the same options would fail.
 void reportCheck(const std::filesystem::path& scene, const ReadOptions& options, bool json, std::FILE* out);
 
 }  // namespace lobe

@@ -21,7 +21,7 @@ struct Quantile {
 };
 constexpr std::array<Quantile, 5> kQuantiles{{{"min", 0}, {"p10", 0.1}, {"median", 0.5}, {"p90", 0.9}, {"max", 1}}};
 
-/// A quantity of the records and its values, sorted.
+/// The sorted values of one quantity over all records.
 struct Distribution {
   const char* name;
   std::vector<float> values;
@@ -39,7 +39,7 @@ Distribution distributionOf(const IlluminationFile& file, const char* name, cons
   return d;
 }
 
-/// Of every quantity; none where there are no records.
+/// The distributions of all quantities; empty if there are no records.
 std::vector<Distribution> distributions(const IlluminationFile& file) {
   if (file.records().empty()) return {};
   return {distributionOf(file, "radius", [](const auto& r) { return r.radius; }),
@@ -110,11 +110,10 @@ void printIllumination(const IlluminationFile& file, const std::filesystem::path
   fmt::print(out, "{}\n  scene      {}, hash {:016x}\n", path.string(), info.scene, info.sceneHash);
   fmt::print(
       out,
-      "  settings   trained from {}, {} passes of {} photons and {} importons, {} components, seed {}, {} shares\n",
+      "  settings   trained from {}, {} passes of {} photons and {} importons, {} components, seed {}, {} fractions\n",
       s.from, s.passes, s.photons, s.importons, s.components, s.seed, s.learntFractions ? "learnt" : "fixed");
   fmt::print(out, "  training   {} particles; unit of length {:.4g}\n", info.particles, info.unit);
-  fmt::print(out, "  records    {}, of which {:.2f} % undersampled\n", file.records().size(),
-             100 * info.undersampledFraction);
+  fmt::print(out, "  records    {}, {:.2f} % undersampled\n", file.records().size(), 100 * info.undersampledFraction);
   fmt::print(out, "  format {}.{}, Lobe {}, {} bytes, hash {:016x}\n", file.header().major, file.header().minor,
              info.toolVersion, file.bytes(), file.header().hash);
   std::vector<std::string> header{"over the records"};

@@ -1,5 +1,5 @@
 #pragma once
-// What lobedump says of trained illumination, for people, machines and viewers of point clouds.
+// Reports on trained illumination by lobedump, as text, JSON and point clouds.
 
 #include <cstdio>
 #include <filesystem>
@@ -10,17 +10,18 @@
 
 namespace lobe {
 
-/// Scene, settings, records and the distributions of what they hold; with every record and its components when
-/// withRecords.
+/// Scene, settings, and the distributions of the fields of the records; with withRecords also every record and its
+/// components.
 nlohmann::ordered_json toJson(const IlluminationFile& file, const std::filesystem::path& path, bool withRecords);
 
-/// The same as lines of text and a table of quantiles.
+/// Prints the same as text with a table of quantiles.
 void printIllumination(const IlluminationFile& file, const std::filesystem::path& path, std::FILE* out);
 
-/// A row for every record.
+/// Prints a row for every record.
 void printRecords(const IlluminationFile& file, std::FILE* out);
 
-/// The records as a binary PLY: x y z, nx ny nz, radius, samples, background. Throws std::runtime_error that names out.
+/// Writes the records as vertices of a binary PLY file: x y z, nx ny nz, radius, samples, background, bsdf_fraction.
+/// Throws std::runtime_error that names the file.
 void writePoints(const IlluminationFile& file, const std::filesystem::path& out);
 
 }  // namespace lobe

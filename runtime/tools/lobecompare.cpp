@@ -1,4 +1,4 @@
-// lobecompare: how far images are from a reference, or what they are together.
+// lobecompare: measures the errors of images against a reference, or merges images.
 
 #include <cstdio>
 #include <filesystem>
@@ -31,20 +31,27 @@ struct Comparison {
 };
 
 void declare(CLI::App& app, Arguments& arguments) {
-  app.add_option("REFERENCE", arguments.reference, "The image to compare with; with --merge the first of the images")
-      ->required();
-  app.add_option("IMAGE", arguments.images, "Images of the same size")->required();
-  auto* json = app.add_flag("--json", arguments.json, "Print an array of objects instead of a table");
+  app.add_option("REFERENCE", arguments.reference, "Reference image; with --merge, the first of the images")
+      ->required()
+      ->type_name("FILE");
+  app.add_option("IMAGE", arguments.images, "Images of the same size as the reference")
+      ->required()
+      ->type_name("FILE")
+      ->default_str("");
+  auto* json = app.add_flag("--json", arguments.json, "Print the errors as JSON");
   auto* map = app.add_option(
       "--map", arguments.map,
-      fmt::format("Write the relative error of each pixel of the one image as a PNG, from {:g} (black) over "
-                  "blue, red and yellow to {:g} (white)",
+      fmt::format("Write a map of the relative error of each pixel of a single image to this PNG file, from {:g} "
+                  "(black) over blue, red and yellow to {:g} (white)",
                   lobe::kMapLow, lobe::kMapHigh));
-  auto* shrink =
-      app.add_option("--shrink", arguments.shrink, "First average the reference over squares of so many pixels a side")
-          ->check(CLI::Range(1, 1024));
+  map->type_name("OUT.png");
+  auto* shrink = app.add_option("--shrink", arguments.shrink, "First average the reference over squares of N×N pixels")
+                     ->check(CLI::Range(1, 1024))
+                     ->type_name("N");
   app.add_option("--merge", arguments.merge,
-                 "Write the mean of the images, weighted by their numbers of samples, as an .exr; compare nothing")
+                 "Write the mean of all images, weighted by their numbers of samples, to this EXR file, instead of "
+                 "comparing them")
+      ->type_name("OUT.exr")
       ->excludes(json)
       ->excludes(map)
       ->excludes(shrink);
@@ -58,17 +65,18 @@ std::vector<std::filesystem::path> all(const Arguments& arguments) {
 
 void checkMerge(const Arguments& arguments) {
   if (std::filesystem::path(arguments.merge).extension() != ".exr")
-    throw lobe::UsageError("--merge is written as .exr, which says how many samples it has");
+    throw lobe::UsageError("--merge must name an .exr file, because it stores the number of samples");
   for (const auto& path : all(arguments))
     if (std::filesystem::weakly_canonical(path) == std::filesystem::weakly_canonical(arguments.merge))
-      throw lobe::UsageError(fmt::format("{}: would be overwritten, it is named twice", arguments.merge));
+      throw lobe::UsageError(
+          fmt::format("{}: is both an input and the output, and would be overwritten", arguments.merge));
 }
 
 void checkArguments(const Arguments& arguments) {
   if (!arguments.merge.empty()) checkMerge(arguments);
   if (arguments.map.empty()) return;
-  if (arguments.images.size() > 1) throw lobe::UsageError("--map shows one image, but several are given");
-  if (std::filesystem::path(arguments.map).extension() != ".png") throw lobe::UsageError("--map is written as .png");
+  if (arguments.images.size() > 1) throw lobe::UsageError("--map takes one image, but several are given");
+  if (std::filesystem::path(arguments.map).extension() != ".png") throw lobe::UsageError("--map must name a .png file");
 }
 
 lobe::ErrorMetrics measure(const lobe::Image& reference, const lobe::Image& image, const std::string& name) {
@@ -140,6 +148,6 @@ void run(const Arguments& arguments) {
 int main(int argc, char** argv) {
   Arguments arguments;
   return lobe::runTool(
-      "lobecompare", "Errors of images against a reference, as numbers and as a map; or images put together.", argc,
-      argv, [&](CLI::App& app) { declare(app, arguments); }, [&] { run(arguments); });
+      "lobecompare", "Measures the errors of images against a reference, or merges images.", argc, argv,
+      [&](CLI::App& app) { declare(app, arguments); }, [&] { run(arguments); });
 }

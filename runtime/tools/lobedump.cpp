@@ -1,5 +1,5 @@
-// lobedump FILE...: shows what caches of BRDFs (.lobe) and of illumination (.illum) hold and how good they are, as
-// tables, JSON, pictures, points or differences.
+// lobedump FILE...: shows the content and the quality of BRDF caches (.lobe) and of trained illumination (.illum), as
+// tables, JSON, plots, point clouds or differences.
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -16,7 +16,7 @@
 
 namespace {
 
-/// Strings of damaged files may be no text.
+/// Strings of damaged files may be invalid UTF-8.
 std::string dumped(const nlohmann::ordered_json& json) {
   return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
@@ -26,17 +26,17 @@ using namespace lobe;
 constexpr int kPlotRows = 5;
 
 const char* const kFooter =
-    R"(--plot draws a row of panels for each record, over the equal-area disc of sampled directions (x is right, y up,
-the edge is the horizon; the given direction is at positive x when its azimuth is 0). Narrow lobes are drawn larger.
-  1 target  the lobe times the cosine, normalised (only with --scene)
-  2 fit     the mixture times the cosine, normalised, with the one-sigma ellipses of its components in red
-    Both from dark violet to light yellow: a logarithmic scale over three decades below the row's peak.
-  3 ratio   target over the graded density, a tenth of the lobe's own sampler and nine tenths of the fit, from blue
-            (1/10 and below: drawn too often) over white (1) to red (10 and above: drawn too seldom); with --scene
-The ring marks the worst f/p, the largest ratio met when grading; at the border when it is out of view. Grey is outside
-the disc. A table says which record each row shows, and where.
+    R"(--plot draws one row of panels per record, over the equal-area disc of sampled directions (x points right, y up;
+the edge is the horizon; outgoing directions of azimuth 0 lie on the positive x axis). Narrow lobes are enlarged.
+  1 target  lobe times cosine, normalised (only with --scene)
+  2 fit     mixture times cosine, normalised, with the one-sigma ellipses of its components in red
+            Target and fit: a logarithmic scale of three decades below the peak of the row, dark violet to light yellow.
+  3 ratio   target over the graded density (0.1 BSDF + 0.9 fit), from blue (1/10 or less: sampled too often) over
+            white (1) to red (10 or more: sampled too rarely); only with --scene
+A ring marks the worst f/p, the largest ratio found in grading; it is at the border if it is out of view. The area
+outside the disc is grey. A table lists the record and the view of each row.
 
---diff ends with 0 when both caches are the same to the bit, with 1 when they differ, and with 2 on an error.)";
+--diff exits with 0 if the two caches are identical, with 1 if they differ, and with 2 on an error.)";
 
 struct Options {
   std::vector<std::string> files;
@@ -49,29 +49,30 @@ struct Options {
 };
 
 void declare(CLI::App& app, Options& o) {
-  app.add_option("files", o.files, "Cache files: of lobes (.lobe), or of illumination (.illum)")
+  app.add_option("files", o.files, "BRDF caches (.lobe) or trained illumination (.illum)")
       ->required()
       ->type_name("FILE")
       ->default_str("");
-  auto* records = app.add_flag("--records", o.records, "Also print a row for every record");
-  auto* json =
-      app.add_flag("--json", o.json, "Print everything as JSON; the records of illumination only with --records");
-  app.add_flag("--diff", o.diff, "Say what differs between two caches")->excludes(records);
-  auto* plot = app.add_option("--plot", o.plot, "Draw records of one cache: target, fit and ratio")
-                   ->type_name("OUT.png")
-                   ->default_str("")
-                   ->excludes(records)
-                   ->excludes(json)
-                   ->excludes("--diff");
-  app.add_option("--record", o.record, "Draw this one; else some from the grid's first to its last")
+  auto* records = app.add_flag("--records", o.records, "Also print one row per record");
+  auto* json = app.add_flag("--json", o.json, "Print everything as JSON (records of .illum files only with --records)");
+  app.add_flag("--diff", o.diff, "Compare two BRDF caches")->excludes(records);
+  auto* plot =
+      app.add_option("--plot", o.plot, "Plot target, fit and ratio of records of one BRDF cache to this PNG file")
+          ->type_name("OUT.png")
+          ->default_str("")
+          ->excludes(records)
+          ->excludes(json)
+          ->excludes("--diff");
+  app.add_option("--record", o.record,
+                 "Index of the only record to plot (default: up to five, from the first to the last)")
       ->check(CLI::NonNegativeNumber)
       ->default_str("")
       ->needs(plot);
-  app.add_option("--scene", o.scene, "Where to find the lobe, for target and ratio: the scene the cache was made from")
+  app.add_option("--scene", o.scene, "Scene from which the cache was made; needed to plot target and ratio")
       ->type_name("SCENE.xml")
       ->default_str("")
       ->needs(plot);
-  app.add_option("--points", o.points, "Write the records of one file of illumination as a cloud of points")
+  app.add_option("--points", o.points, "Write the records of one .illum file as a point cloud")
       ->type_name("OUT.ply")
       ->default_str("")
       ->excludes(records)
@@ -83,16 +84,16 @@ void declare(CLI::App& app, Options& o) {
 }
 
 void validate(const Options& o) {
-  if (o.diff && o.files.size() != 2) throw UsageError("--diff takes two cache files");
+  if (o.diff && o.files.size() != 2) throw UsageError("--diff needs two cache files");
   if (!o.points.empty()) {
-    if (o.files.size() != 1) throw UsageError("--points takes one file of illumination");
+    if (o.files.size() != 1) throw UsageError("--points needs exactly one .illum file");
     if (std::filesystem::path(o.points).extension() != ".ply")
-      throw UsageError(fmt::format("--points {}: points are written as .ply", o.points));
+      throw UsageError(fmt::format("--points {}: must be a .ply file", o.points));
   }
   if (o.plot.empty()) return;
-  if (o.files.size() != 1) throw UsageError("--plot takes one cache file");
+  if (o.files.size() != 1) throw UsageError("--plot needs exactly one cache file");
   if (std::filesystem::path(o.plot).extension() != ".png")
-    throw UsageError(fmt::format("--plot {}: pictures are written as .png", o.plot));
+    throw UsageError(fmt::format("--plot {}: must be a .png file", o.plot));
 }
 
 // ---- Tables
@@ -126,21 +127,23 @@ bool runDiff(const LobeCache& a, const LobeCache& b, const Options& o) {
   return difference.equal;
 }
 
-// ---- Pictures
+// ---- Plots
 
 LobePtr findLobe(const LobeCache& cache, Options& o) {
   o.read.geometry = false;
-  // What the reader does not know cannot be the lobe.
+  // Parts of the scene that the reader does not support cannot contain the lobe.
   o.read.lenient = true;
   const std::vector<LobeUse> uses = collectLobes(readScene(o.scene, o.read));
   const auto found = std::ranges::find_if(uses, [&](const LobeUse& u) { return u.lobe->key() == cache.info().key; });
   if (found == uses.end())
     throw std::runtime_error(
         fmt::format("{}: no material has the lobe of {} ({}, key {}); plot without --scene, or give the scene and the "
-                    "-D that the cache was made from",
+                    "-D options from which the cache was made",
                     o.scene, o.files[0], cache.info().summary, cache.info().key));
   if (found->lobe->revision() != cache.info().modelRevision)
-    printWarning("lobedump", fmt::format("{}: the model's code has changed since; the target is today's", o.files[0]));
+    printWarning("lobedump",
+                 fmt::format("{}: the code of the model has changed since the fit; the target shows the current model",
+                             o.files[0]));
   return found->lobe;
 }
 
@@ -149,19 +152,20 @@ std::vector<int> chosenRecords(const LobeCache& cache, const Options& o) {
   if (o.record >= count) throw UsageError(fmt::format("--record must be from 0 to {}", count - 1));
   std::vector<int> records = o.record >= 0 ? std::vector{o.record} : spreadRecords(count, kPlotRows);
   if (std::ranges::any_of(records, [&](int i) { return !graded(cache.records()[static_cast<std::size_t>(i)]); }))
-    throw std::runtime_error(fmt::format("{}: {} is left to the BSDF's own sampling; there is no fit to draw",
-                                         o.files[0], cache.info().summary));
+    throw std::runtime_error(
+        fmt::format("{}: {} has a record that is left to BSDF sampling, so there is no fit to draw", o.files[0],
+                    cache.info().summary));
   return records;
 }
 
 std::string pointText(const Vec2& y) {
-  // Adding zero takes the sign from what is rounded to it.
+  // Adding zero turns -0 into 0.
   const auto rounded = [](float v) { return std::round(1000 * v) / 1000 + 0.0f; };
   return fmt::format("{:.3f}, {:.3f}", rounded(y.x()), rounded(y.y()));
 }
 
 void printLegend(const LobeCache& cache, const Plot& plot, const Options& o) {
-  fmt::print("{}: {} of {}, a row each\n", o.plot, o.scene.empty() ? "fit" : "target, fit and ratio",
+  fmt::print("{}: {} of {}, one row per record\n", o.plot, o.scene.empty() ? "fit" : "target, fit and ratio",
              cache.info().summary);
   Table table(
       {"row", "record", "elevation", "azimuth", "comp.", "NEV", "worst f/p", "at x, y", "view x, y", "±", "peak"});
@@ -193,9 +197,9 @@ bool isIllumination(const std::string& file) {
 }
 
 void validateForIllumination(const Options& o) {
-  if (o.diff || !o.plot.empty()) throw UsageError("--diff and --plot are for caches of lobes");
+  if (o.diff || !o.plot.empty()) throw UsageError("--diff and --plot work on BRDF caches (.lobe) only");
   if (!std::ranges::all_of(o.files, isIllumination))
-    throw UsageError("caches of lobes and of illumination are shown by a run each");
+    throw UsageError("BRDF caches (.lobe) and illumination (.illum) need separate runs");
 }
 
 void runIllumination(const Options& o) {
@@ -216,14 +220,14 @@ void runIllumination(const Options& o) {
   if (o.json) fmt::print("{}\n", dumped(json));
 }
 
-/// false: --diff found a difference.
+/// Returns false if --diff found a difference.
 bool run(Options& o) {
   validate(o);
   if (std::ranges::any_of(o.files, isIllumination)) {
     runIllumination(o);
     return true;
   }
-  if (!o.points.empty()) throw UsageError("--points is for files of illumination");
+  if (!o.points.empty()) throw UsageError("--points works on .illum files only");
   std::vector<LobeCache> caches;
   for (const std::string& file : o.files) caches.push_back(LobeCache::open(file));
   if (o.diff) return runDiff(caches[0], caches[1], o);
@@ -240,9 +244,9 @@ int main(int argc, char** argv) {
   Options options;
   bool same = true;
   const int code = lobe::runTool(
-      "lobedump", "Shows Gaussian-mixture caches: what they are and how good each record is.", argc, argv,
+      "lobedump", "Shows the content and the quality of BRDF caches and of trained illumination.", argc, argv,
       [&](CLI::App& app) { declare(app, options); }, [&] { same = run(options); });
-  // As cmp does, so that 1 means only one thing.
+  // As in cmp, where 1 only means that the files differ.
   if (options.diff && code == 1) return 2;
   return same ? code : 1;
 }

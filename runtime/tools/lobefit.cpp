@@ -1,4 +1,4 @@
-// lobefit SCENE.xml [-o DIR]: compiles the lobes of a scene's materials into cache files.
+// lobefit SCENE.xml [-o DIR]: compiles the glossy lobes of a scene's materials into cache files.
 
 #include <algorithm>
 #include <chrono>
@@ -27,7 +27,7 @@ struct Options {
   CompileOptions compile;
   ReadOptions read;
   std::string method = nameOf(FitMethod::automatic);
-  std::optional<float> quality, reduction;  // where given
+  std::optional<float> quality, reduction;  // empty if not given
   int threads = 0;
   bool check = false;
   bool json = false;
@@ -35,28 +35,38 @@ struct Options {
 
 void declare(CLI::App& app, Options& o) {
   app.add_option("scene", o.scene, "Mitsuba scene file")->required()->type_name("SCENE.xml")->default_str("");
-  app.add_option("-o,--output", o.compile.directory, "Folder of the cache files, made when missing")->type_name("DIR");
+  app.add_option("-o,--output", o.compile.directory, "Folder of the cache files, created if missing")->type_name("DIR");
   app.add_option("--method", o.method,
-                 "How records are fitted: auto (what is enough for --quality), wem (weighted EM), ceres (least squares "
-                 "for the product) or eq8 (the paper's)");
-  app.add_option("--components", o.compile.settings.components, "Gaussians of a record, with auto at most so many");
-  app.add_option("--quality", o.quality, "With auto, the NEV of a record's use in a product that is good enough")
+                 "Fitting method: auto (the cheapest that reaches --quality), wem (weighted EM), ceres (least squares "
+                 "for product sampling) or eq8 (least squares on Eq. 8 of Herholz et al. 2016)");
+  app.add_option("--components", o.compile.settings.components,
+                 "Number of Gaussians per record (with --method auto: the maximum)");
+  app.add_option("--quality", o.quality,
+                 "Target relative variance (NEV) of product sampling with a record (only --method auto)")
       ->default_str(fmt::format("{:g}", o.compile.settings.quality));
-  app.add_option("--elevations", o.compile.elevations, "So many records for every isotropic lobe, needed or not");
-  app.add_option("--directions", o.compile.directions, "So many records for every anisotropic lobe, needed or not");
-  app.add_option("--samples", o.compile.settings.samples, "Samples drawn for a record");
+  app.add_option("--elevations", o.compile.elevations,
+                 fmt::format("Fixed number of records per isotropic lobe (default: {}; with --method auto, as many as "
+                             "the quality requires)",
+                             kElevations));
+  app.add_option(
+      "--directions", o.compile.directions,
+      fmt::format("Fixed number of records per anisotropic lobe (default: {}; with --method auto, as many as "
+                  "the quality requires)",
+                  kDirections));
+  app.add_option("--samples", o.compile.settings.samples, "Number of samples drawn to fit a record");
   app.add_option("--reduction", o.reduction,
-                 "Not with auto: merge components while the sum of Runnalls' costs stays below this; 0 keeps all")
+                 "Merge Gaussians of a record up to this cost (Runnalls 2007; 0: no merging; not with --method auto)")
       ->default_str(fmt::format("{:g}", o.compile.settings.reduction));
-  app.add_flag("--force", o.compile.force, "Fit again what is up to date");
-  app.add_flag("--lenient", o.read.lenient, "Replace or leave out what is at fault in the scene, with warnings");
-  app.add_flag("--check", o.check, "Only read the scene's materials and print all that is found; exit 1 on faults");
-  app.add_flag("--json", o.json, "Print the table, or what --check finds, as JSON");
+  app.add_flag("--force", o.compile.force, "Fit all lobes again, even if their caches are up to date");
+  app.add_flag("--lenient", o.read.lenient, "Replace or leave out faulty parts of the scene, with warnings");
+  app.add_flag("--check", o.check,
+               "Only read the materials and print all faults, warnings and notes; exit with 1 if they cannot be read");
+  app.add_flag("--json", o.json, "Print the table of caches, or the result of --check, as JSON");
   addThreads(app, o.threads);
   addDefinitions(app, o.read.definitions);
 }
 
-/// Options that would have no effect are slips, too.
+/// Options that have no effect with the chosen method are errors, too.
 void takeMethod(Options& o) {
   const std::optional<FitMethod> method = fitMethodOf(o.method);
   if (!method)
@@ -64,8 +74,9 @@ void takeMethod(Options& o) {
   o.compile.settings.method = *method;
   const bool isAuto = o.compile.settings.method == FitMethod::automatic;
   if (o.reduction && isAuto)
-    throw UsageError("--reduction is not for --method auto, which chooses how many components");
-  if (o.quality && !isAuto) throw UsageError("--quality is for --method auto, the others fit what they are told to");
+    throw UsageError("--reduction cannot be combined with --method auto, which chooses the number of Gaussians itself");
+  if (o.quality && !isAuto)
+    throw UsageError("--quality requires --method auto; the other methods do not choose by quality");
   if (o.reduction) o.compile.settings.reduction = *o.reduction;
   if (o.quality) o.compile.settings.quality = *o.quality;
 }
@@ -84,7 +95,7 @@ double secondsToRun(const CompileJob& job, Progress& progress) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// Faults of files begin with the file's path.
+/// Error messages about a file begin with its path.
 std::string withoutPath(const std::string& fault, const std::filesystem::path& path) {
   const std::string start = path.string() + ": ";
   return fault.starts_with(start) ? fault.substr(start.size()) : fault;
@@ -96,7 +107,7 @@ CacheReport compileOne(const CompileJob& job, Progress& progress) {
   return {job.path, job.info.summary, job.use.materials, summarise(cache), job.upToDate, seconds};
 }
 
-/// The faults of the lobes that have no cache, as one line; the others are written.
+/// Reports the lobes that could not be fitted in one line; the caches of the others have been written.
 [[noreturn]] void failWith(const std::vector<std::string>& faults, std::size_t jobs) {
   const std::size_t failed = faults.size();
   std::string line = faults.front();
@@ -110,13 +121,13 @@ std::vector<CacheReport> compileAll(const std::vector<CompileJob>& jobs) {
   for (const CompileJob& job : jobs) {
     if (!job.upToDate) directions += workOf(job);
     if (!job.stale.empty())
-      fmt::print(stderr, "lobefit: {} is made again: {}\n", job.path.string(), withoutPath(job.stale, job.path));
+      fmt::print(stderr, "lobefit: {} is fitted again: {}\n", job.path.string(), withoutPath(job.stale, job.path));
   }
   Progress progress("fitting", directions);
   std::vector<CacheReport> reports(jobs.size());
   std::vector<std::string> faultOf(jobs.size());
-  // Lobes are fitted in parallel, too, because the first few directions of each leave cores idle. An exception would
-  // cancel the others, so each lobe's is kept.
+  // Lobes are fitted in parallel as well, because the first few directions of each lobe leave cores idle. An exception
+  // would cancel the other lobes, so the message of each is stored.
   parallelFor(std::size_t{0}, jobs.size(), [&](std::size_t i) {
     try {
       reports[i] = compileOne(jobs[i], progress);
@@ -140,10 +151,10 @@ void printResult(const std::vector<CacheReport>& reports, const Options& o) {
   if (!reports.empty()) printReports(reports, true, stdout);
 }
 
-void say(const std::vector<CacheReport>& reports, const Options& o) {
+void reportSummary(const std::vector<CacheReport>& reports, const Options& o) {
   const auto fresh = std::ranges::count_if(reports, [](const CacheReport& r) { return !r.upToDate; });
   if (reports.empty())
-    fmt::print(stderr, "lobefit: nothing to do: no material of {} has a lobe to fit\n", o.scene);
+    fmt::print(stderr, "lobefit: nothing to do: no material of {} has a glossy lobe to fit\n", o.scene);
   else if (fresh == 0)
     fmt::print(stderr, "lobefit: nothing to do: all {} lobes in {} are up to date\n", reports.size(),
                o.compile.directory.string());
@@ -151,8 +162,8 @@ void say(const std::vector<CacheReport>& reports, const Options& o) {
     fmt::print(stderr, "lobefit: {} of {} lobes written to {}\n", fresh, reports.size(), o.compile.directory.string());
 }
 
-/// What was asked for and is not reached has to be seen.
-void sayWhatMisses(const std::vector<CacheReport>& reports, const Options& o) {
+/// Tells the user which lobes miss the quality target.
+void reportMissedQuality(const std::vector<CacheReport>& reports, const Options& o) {
   if (o.compile.settings.method != FitMethod::automatic) return;
   const float quality = o.compile.settings.quality;
   const CacheReport* worst = nullptr;
@@ -163,8 +174,9 @@ void sayWhatMisses(const std::vector<CacheReport>& reports, const Options& o) {
     if (!worst || r.summary.nevWorst > worst->summary.nevWorst) worst = &r;
   }
   if (worst)
-    printNote("lobefit", fmt::format("{} of {} lobes have records above --quality {:g}; the worst NEV is {:.3f}, of {}",
-                                     missing, reports.size(), quality, worst->summary.nevWorst, worst->lobe));
+    printNote("lobefit",
+              fmt::format("{} of {} lobes have records that miss --quality {:g}; the worst NEV is {:.3f}, of {}",
+                          missing, reports.size(), quality, worst->summary.nevWorst, worst->lobe));
 }
 
 void run(Options& o) {
@@ -178,8 +190,8 @@ void run(Options& o) {
   for (const std::string& note : scene.notes) printNote("lobefit", note);
   for (const std::string& warning : scene.warnings) printWarning("lobefit", warning);
   const std::vector<CacheReport> reports = compileAll(planCompile(collectLobes(scene), o.compile));
-  say(reports, o);
-  sayWhatMisses(reports, o);
+  reportSummary(reports, o);
+  reportMissedQuality(reports, o);
   printResult(reports, o);
 }
 
@@ -188,6 +200,6 @@ void run(Options& o) {
 int main(int argc, char** argv) {
   Options options;
   return lobe::runTool(
-      "lobefit", "Compiles the reflectance lobes of a scene's materials into Gaussian-mixture caches.", argc, argv,
+      "lobefit", "Compiles the glossy lobes of a scene's materials into caches of Gaussian mixtures.", argc, argv,
       [&](CLI::App& app) { declare(app, options); }, [&] { run(options); });
 }

@@ -15,7 +15,7 @@ namespace {
 
 using namespace lobe;
 
-/// Two numbers with a sign between them, as `form` shows it.
+/// Parses two numbers separated by `sign`; `form` describes the format in the error message.
 std::pair<int, int> parsePair(const std::string& option, const std::string& text, char sign, const char* form) {
   int first = 0, second = 0, end = 0;
   char between = 0;
@@ -25,12 +25,12 @@ std::pair<int, int> parsePair(const std::string& option, const std::string& text
   return {first, second};
 }
 
-constexpr std::uint64_t kMaxSeed = std::uint64_t{1} << 53;  // a picture's metadata holds it exactly
+constexpr std::uint64_t kMaxSeed = std::uint64_t{1} << 53;  // the metadata of a picture stores it exactly
 
 const std::vector<std::string> kIntegratorNames{"path", "guided", "product"};  // in the order of IntegratorKind
 const std::vector<std::string> kFractionsNames{"fixed", "learnt"};
 
-// Accepted in version 0.2 only.
+// The old names are accepted in version 0.2 only.
 const std::vector<RenamedOption> kRenamedOptions{
     {"--shares", "--bsdf-fraction"},
     {"--termination", "--russian-roulette", {{"plain", "throughput"}, {"window", "adjoint"}}},
@@ -41,36 +41,45 @@ struct Options {
   std::string size, record, integrator = "product", fractions = "learnt";
   int threads = 0;
   bool check = false, json = false;
-  std::vector<const CLI::Option*> training;  ///< options that only some integrators have a use for
+  std::vector<const CLI::Option*> training;  ///< options that some integrators ignore
 };
 
-/// --illumination goes with none of the options declared here.
+/// Declares the training options, all of which exclude --illumination.
 void declareTraining(CLI::App& app, Options& options) {
   RenderJob& job = options.job;
   app.option_defaults()->group("Training");
   TrainingPlan& plan = job.training;
-  app.add_option("--train", plan.from, "What records learn from: photons, paths (of the camera) or both")
-      ->transform(CLI::CheckedTransformer(trainFromNames()))
+  app.add_option("--train", plan.from, "Source of the training samples: photons, camera paths or both")
+      ->transform(CLI::CheckedTransformer(trainFromNames()).description("{photons,paths,both}"))
       ->default_str("both");
-  app.add_option("--passes", job.passes, "Training passes (default: 8, or as many as fit into the training's seconds)");
-  app.add_option("--photons", plan.photons, "Photons a pass")->check(CLI::PositiveNumber)->capture_default_str();
-  app.add_option("--importons", plan.importons, "Importons a pass")->check(CLI::PositiveNumber)->capture_default_str();
-  app.add_option("--components", plan.records.components, "Gaussians of an illumination record, 1 to 8")
+  app.add_option("--passes", job.passes,
+                 "Number of training passes (default: 8, or unlimited if the training time is limited)");
+  app.add_option("--photons", plan.photons, "Number of photons per pass")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--importons", plan.importons, "Number of importons per pass")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--components", plan.records.components, "Number of Gaussians per illumination record")
       ->check(CLI::Range(1, FieldOptions::kMostComponents))
       ->capture_default_str();
   app.add_option("--bsdf-fraction", options.fractions,
-                 "BSDF sampling fraction of product: learnt by each record, or fixed")
+                 "BSDF sampling fraction of the product integrator: learnt for each record, or fixed")
       ->check(CLI::IsMember(kFractionsNames))
       ->capture_default_str();
   app.add_option("--train-seconds", job.trainSeconds,
-                 "Training ends by then, as far as can be foreseen (default: 0.15 of --seconds; with --spp no limit)");
+                 "Approximate time limit for training in seconds (default: 15 % of --seconds, or no limit with --spp)");
   const auto ofTraining = [&app] {
     return app.get_options([](const CLI::Option* o) { return o->get_group() == "Training"; });
   };
   for (const CLI::Option* option : ofTraining()) options.training.push_back(option);
-  app.add_option("--save-illumination", job.saveIllumination, "Keep what was trained in this file (.illum)");
-  auto* stored = app.add_option("--illumination", job.illumination,
-                                "Use what an earlier run kept of the same scene, from whatever camera; do not train");
+  app.add_option("--save-illumination", job.saveIllumination, "Save the trained illumination to this file")
+      ->type_name("OUT.illum");
+  auto* stored =
+      app.add_option(
+             "--illumination", job.illumination,
+             "Load illumination saved by an earlier run for the same scene (with any camera) instead of training")
+          ->type_name("FILE.illum");
   for (CLI::Option* option : ofTraining())
     if (option != stored) stored->excludes(option);
   app.option_defaults()->group("Options");
@@ -78,51 +87,68 @@ void declareTraining(CLI::App& app, Options& options) {
 
 void declare(CLI::App& app, Options& options) {
   RenderJob& job = options.job;
-  app.add_option("scene", job.scene, "Mitsuba scene file (XML)")->required();
-  app.add_option("-o,--output", job.outputs, "Picture, .exr or .png; may be given several times")
-      ->allow_extra_args(false);  // else it would swallow the scene's name after it
-  app.add_option("--cache", job.cacheFolder, "Folder of the caches that lobefit made")->capture_default_str();
-  app.add_option("--integrator", options.integrator, "path, guided or product")
+  app.add_option("scene", job.scene, "Mitsuba scene file")->required()->type_name("SCENE.xml");
+  app.add_option("-o,--output", job.outputs, "Output picture, .exr or .png (repeatable)")
+      ->type_name("FILE")
+      ->default_str("")
+      ->allow_extra_args(false);  // otherwise it would take the scene after it as another picture
+  app.add_option("--cache", job.cacheFolder, "Folder of the BRDF caches made by lobefit")
+      ->type_name("DIR")
+      ->capture_default_str();
+  app.add_option(
+         "--integrator", options.integrator,
+         "Integrator: path (BSDF sampling), guided (illumination and BSDF) or product (BRDF times illumination)")
       ->check(CLI::IsMember(kIntegratorNames))
       ->capture_default_str();
-  app.add_option("--spp", job.samples, "Samples per pixel");
+  app.add_option("--spp", job.samples, "Number of samples per pixel");
   app.add_option("--sample-offset", job.sampleOffset,
-                 "First of these samples: parts of a picture for lobecompare --merge")
+                 "Index of the first sample, to render parts of a picture for lobecompare --merge")
       ->capture_default_str();
-  app.add_option("--seconds", job.seconds, "Seconds of training and rendering, instead of --spp");
-  app.add_option("--size", options.size, "WIDTHxHEIGHT in pixels, instead of the scene's");
-  app.add_option("--max-depth", job.maxDepth, "Longest path in segments (default: the scene's max_depth, or no limit)");
-  app.add_option("--reduction", job.reduction,
-                 "Merge Gaussians of lobes and records up to this cost (Runnalls; 0: none, the paper: 0.2)")
+  app.add_option("--seconds", job.seconds, "Time for training and rendering in seconds, instead of --spp");
+  app.add_option("--size", options.size, "Picture size in pixels (default: the size in the scene)")
+      ->type_name("WIDTHxHEIGHT");
+  app.add_option("--max-depth", job.maxDepth,
+                 "Maximum path length in segments (default: max_depth of the scene, or no limit)");
+  app.add_option(
+         "--reduction", job.reduction,
+         "Merge Gaussians of BRDF caches and illumination records up to this cost (Runnalls 2007; 0: no merging)")
       ->capture_default_str();
-  app.add_option("--russian-roulette", job.russianRoulette,
-                 "Russian roulette by throughput, or adjoint: adjoint-driven, with splitting (guided, product)")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, RussianRoulette>{
-          {"throughput", RussianRoulette::throughput}, {"adjoint", RussianRoulette::adjoint}}))
+  app.add_option(
+         "--russian-roulette", job.russianRoulette,
+         "Russian roulette by throughput, or adjoint-driven Russian roulette and splitting (guided and product)")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, RussianRoulette>{{"throughput", RussianRoulette::throughput},
+                                                                         {"adjoint", RussianRoulette::adjoint}})
+              .description("{throughput,adjoint}"))
       ->default_str("adjoint");
   app.add_option("--seed", job.seed, "Random seed")
       ->check(CLI::Range(std::uint64_t{0}, kMaxSeed))
       ->capture_default_str();
-  app.add_option("--reference", job.reference, "Picture to measure the error against while rendering");
-  app.add_option("--convergence", job.convergence, "CSV of that error over time");
-  app.add_option("--stats", job.stats, "JSON file for the run's statistics");
+  app.add_option("--reference", job.reference, "Reference picture for --convergence")->type_name("FILE");
+  app.add_option("--convergence", job.convergence, "Write the error against --reference over time to this CSV file")
+      ->type_name("OUT.csv");
+  app.add_option("--stats", job.stats, "Write statistics of the run to this JSON file")->type_name("OUT.json");
   auto* record =
       app.add_option("--record", options.record,
-                     "X,Y: draw the illumination record that serves what this pixel shows (0,0 is top left)");
+                     "Plot the illumination record that serves the surface seen in this pixel (0,0 is top left)")
+          ->type_name("X,Y");
   app.add_option("--record-image", job.recordImage,
-                 "PNG for it: mixture, particles of the last pass and incident light over the disc of directions")
+                 "PNG file for --record: mixture, particles of the last pass and incident radiance over the disc of "
+                 "directions")
+      ->type_name("OUT.png")
       ->needs(record)
       ->capture_default_str();
-  app.add_flag("--lenient", job.lenient, "Replace or leave out what is at fault in the scene, with warnings");
+  app.add_flag("--lenient", job.lenient, "Replace or leave out faulty parts of the scene, with warnings");
   auto* check =
-      app.add_flag("--check", options.check, "Only read the scene and print all that is found; exit 1 on faults");
-  app.add_flag("--json", options.json, "Print what --check finds as JSON")->needs(check);
+      app.add_flag("--check", options.check,
+                   "Only read the scene and print all faults, warnings and notes; exit with 1 if it cannot be read");
+  app.add_flag("--json", options.json, "Print the result of --check as JSON")->needs(check);
   declareTraining(app, options);
   addDefinitions(app, job.definitions);
   addThreads(app, options.threads);
 }
 
-/// What an integrator has no use for is passed over, so that a script may give the same options to all of them.
+/// Options that the integrator ignores are not errors, so that a script can pass the same options to all integrators.
 void noteUnused(const Options& options) {
   std::vector<std::string> unused;
   for (const CLI::Option* option : options.training) {
@@ -131,7 +157,7 @@ void noteUnused(const Options& options) {
     if (option->count() > 0 && !used) unused.push_back(option->get_name());
   }
   if (!unused.empty())
-    printNote("loberender", fmt::format("{} has no use for {}", options.integrator, fmt::join(unused, ", ")));
+    printNote("loberender", fmt::format("--integrator {} ignores {}", options.integrator, fmt::join(unused, ", ")));
 }
 
 void work(Options& options) {
@@ -153,6 +179,6 @@ void work(Options& options) {
 int main(int argc, char** argv) {
   Options options;
   return runTool(
-      "loberender", "Trains the illumination of a scene and renders it.", argc, argv,
-      [&](CLI::App& app) { declare(app, options); }, [&] { work(options); }, kRenamedOptions);
+      "loberender", "Renders a scene by path tracing or path guiding; guiding first trains the illumination.", argc,
+      argv, [&](CLI::App& app) { declare(app, options); }, [&] { work(options); }, kRenamedOptions);
 }

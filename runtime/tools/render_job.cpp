@@ -35,30 +35,32 @@ namespace lobe {
 namespace {
 
 constexpr const char* kTool = "loberender";
-// Of --seconds. In the kitchen at 60 seconds a sample after 11 seconds of training has the variance of one after 21.
+// Fraction of --seconds. In the kitchen at 60 seconds, samples have the same variance after 11 seconds of training as
+// after 21 seconds.
 constexpr double kTrainingFraction = 0.15;
-constexpr std::int64_t kMaxPixels = 1 << 28;  // a film of more is a slip of the finger
+constexpr std::int64_t kMaxPixels = 1 << 28;  // larger sizes are assumed to be typing errors
 
 const char* nameOf(IntegratorKind kind) {
   constexpr std::array names{"path", "guided", "product"};
   return names[static_cast<std::size_t>(kind)];
 }
 
-/// As a shell takes it for one word.
+/// Quotes the word for the shell if necessary.
 std::string quoted(const std::string& word) {
-  const auto plain = [](unsigned char c) { return std::isalnum(c) || c >= 0x80 || std::strchr("/._-=+,:@%", c); };
-  if (!word.empty() && std::ranges::all_of(word, plain)) return word;
+  const auto safe = [](unsigned char c) { return std::isalnum(c) || c >= 0x80 || std::strchr("/._-=+,:@%", c); };
+  if (!word.empty() && std::ranges::all_of(word, safe)) return word;
   std::string text = "'";
   for (const char c : word) text += c == '\'' ? "'\\''" : std::string(1, c);
   return text + "'";
 }
 
-/// The same for all ways to write a path.
+/// The canonical absolute path, for comparing paths.
 std::filesystem::path placeOf(const std::filesystem::path& path) {
   return std::filesystem::weakly_canonical(std::filesystem::absolute(path));
 }
 
-/// Every file a job writes can be written and is a file of its own: better said now than after hours.
+/// Checks before the work starts that all output files can be written and are distinct from each other and from the
+/// inputs.
 void checkFiles(const RenderJob& job) {
   std::vector<std::filesystem::path> written = job.outputs;
   for (const auto& path : {job.convergence, job.stats, job.saveIllumination})
@@ -69,7 +71,7 @@ void checkFiles(const RenderJob& job) {
     if (!path.empty()) ++uses[placeOf(path)];
   for (const auto& path : written)
     if (++uses[placeOf(path)] > 1)
-      throw UsageError(fmt::format("{}: would be overwritten, it is named twice", path.string()));
+      throw UsageError(fmt::format("{}: is used for more than one file, and would be overwritten", path.string()));
   for (const auto& path : written) checkWritable(path);
 }
 
@@ -87,9 +89,10 @@ Scene readFor(const RenderJob& job) {
   for (const std::string& warning : scene.warnings) printWarning(kTool, warning);
   const bool shines = std::ranges::any_of(scene.shapes, [](const Shape& shape) { return shape.emitter.has_value(); });
   if (!shines && !scene.environment && scene.lights.empty())
-    printWarning(kTool, fmt::format("{}: nothing emits light: the picture is black", job.scene.string()));
+    printWarning(kTool, fmt::format("{}: the scene has no light sources, so the picture is black", job.scene.string()));
   if (job.size) {
-    if (scene.camera.crop) printWarning(kTool, "--size is that of the whole film: the file's crop is dropped");
+    if (scene.camera.crop)
+      printWarning(kTool, "--size sets the size of the whole film; the crop window in the scene file is ignored");
     scene.camera.crop.reset();
     scene.camera.width = job.size->first;
     scene.camera.height = job.size->second;
@@ -98,7 +101,7 @@ Scene readFor(const RenderJob& job) {
   return scene;
 }
 
-/// Error against time, a line a wave.
+/// Records the error against time, one line for each call of add.
 class ConvergenceLog {
  public:
   explicit ConvergenceLog(const RenderJob& job, const Scene& scene) : file_(job.convergence) {
@@ -129,7 +132,8 @@ class ConvergenceLog {
   std::string text_;
 };
 
-/// The caches and what was learnt; neither for `path`. Not moved: the sampler refers to the others.
+/// BRDF caches and trained illumination; both are empty for `path`. Cannot be moved, because the sampler refers to the
+/// other members.
 struct Guiding {
   Guiding() = default;
   Guiding(const Guiding&) = delete;
@@ -140,7 +144,7 @@ struct Guiding {
   std::optional<GuidedSampler> sampler;
 
   const LobeCacheSet* cachesOrNull() const { return caches ? &*caches : nullptr; }
-  std::size_t unreducedBytes = 0;  ///< of the records
+  std::size_t unreducedBytes = 0;  ///< size of the records before merging
 
   void reduceRecords(float threshold) {
     unreducedBytes = training.field.bytes();
@@ -148,7 +152,7 @@ struct Guiding {
   }
 };
 
-/// What a run leaves besides the picture.
+/// Results of a run other than the picture.
 struct RunResult {
   RenderResult render;
   const Guiding& guiding;
@@ -158,12 +162,12 @@ struct RunResult {
   double seconds() const { return training().seconds + render.total.seconds; }
 };
 
-/// What comes before.
+/// Times of the steps before training, in seconds.
 struct LoadTimes {
-  double reading = 0;    ///< the scene file, its meshes and images
-  double building = 0;   ///< acceleration structure and light tables
-  double embree = 0;     ///< Embree's share of it
-  double restoring = 0;  ///< illumination from its file
+  double reading = 0;    ///< reading the scene file, its meshes and images
+  double building = 0;   ///< building the acceleration structure and the light tables
+  double embree = 0;     ///< the part of `building` spent in Embree
+  double restoring = 0;  ///< restoring the illumination from its file
 };
 
 nlohmann::ordered_json asJson(const PassReport& pass) {
@@ -174,7 +178,7 @@ nlohmann::ordered_json asJson(const PassReport& pass) {
           {"log_likelihood", pass.logLikelihood ? nlohmann::ordered_json(*pass.logLikelihood) : nullptr}};
 }
 
-/// Counts over their sum, by name.
+/// Each count divided by the sum of all counts, by name.
 template <std::size_t size>
 nlohmann::ordered_json fractionsOf(const std::array<std::uint64_t, size>& counts,
                                    const std::array<const char*, size>& names) {
@@ -226,7 +230,7 @@ ImageAttributes attributes(const RenderJob& job, std::uint64_t sceneHash, const 
                       {"sampleOffset", static_cast<double>(job.sampleOffset)},
                       {"sceneHash", fmt::format("{:016x}", sceneHash)}};
   if (run.guiding.caches) all["cacheHashes"] = fmt::format("{:016x}", fmt::join(run.guiding.caches->hashes(), " "));
-  // A picture of so many samples is the same bytes on every run; one of so many seconds never is.
+  // Only written for --seconds, because pictures rendered with --spp must be byte-identical on every run.
   if (job.seconds) all["seconds"] = run.seconds();
   return all;
 }
@@ -236,7 +240,7 @@ void train(const RenderJob& job, const RenderScene& scene, const RayCamera& came
   plan.seed = job.seed;
   plan.keepParticles = job.record.has_value();
   plan.seconds = job.trainSeconds.value_or(job.seconds ? kTrainingFraction * *job.seconds : kInfinity);
-  // Only time limits the passes where there is no other reason to stop.
+  // If the time is limited and --passes is not given, only the time limits the number of passes.
   plan.passes = job.passes.value_or(plan.seconds < kInfinity ? std::numeric_limits<int>::max() : plan.passes);
   const bool timed = plan.seconds < kInfinity;
   Progress progress("training", timed ? plan.seconds : plan.passes);
@@ -250,7 +254,7 @@ std::string recordFault(const RenderJob& job, const NoRecord& e) {
   return fmt::format("--record {},{}: {}", job.record->first, job.record->second, e.what());
 }
 
-/// What the pixel of --record shows.
+/// The surface seen in the pixel of --record.
 std::optional<Receiver> receiverFor(const RenderJob& job, const RenderScene& scene, const RayCamera& camera) {
   if (!job.record) return std::nullopt;
   try {
@@ -260,7 +264,7 @@ std::optional<Receiver> receiverFor(const RenderJob& job, const RenderScene& sce
   }
 }
 
-/// Where nothing was learnt there is nothing to draw; the picture is made all the same.
+/// Draws the record of --record. If no record serves the surface, prints a warning and the run continues.
 void drawRecord(const RenderJob& job, const RenderScene& scene, const Receiver& receiver,
                 TrainedIllumination& training) {
   try {
@@ -272,7 +276,7 @@ void drawRecord(const RenderJob& job, const RenderScene& scene, const Receiver& 
   } catch (const NoRecord& e) {
     printWarning(kTool, recordFault(job, e));
   }
-  training.particles = {};  // drawn: rendering needs the memory more
+  training.particles = {};  // not needed any more; frees memory for rendering
 }
 
 std::unique_ptr<Integrator> makeIntegrator(const RenderJob& job, const RenderScene& scene, const Guiding& guiding) {
@@ -308,36 +312,36 @@ void RenderJob::validate() const {
   const auto require = [](bool condition, const std::string& message) {
     if (!condition) throw UsageError(message);
   };
-  require(samples || seconds, "either --spp or --seconds has to be given");
-  require(!samples || !seconds, "--spp and --seconds do not go together");
-  require(!samples || *samples >= 1, "--spp has to be at least 1");
-  require(sampleOffset >= 0, "--sample-offset has to be at least 0");
+  require(samples || seconds, "--spp or --seconds is required");
+  require(!samples || !seconds, "--spp and --seconds cannot be combined");
+  require(!samples || *samples >= 1, "--spp must be at least 1");
+  require(sampleOffset >= 0, "--sample-offset must be at least 0");
   require(sampleOffset == 0 || samples,
-          "--sample-offset goes with --spp: samples of --seconds are not known beforehand");
+          "--sample-offset requires --spp, because --seconds does not fix the number of samples");
   require(!samples || *samples <= std::numeric_limits<int>::max() - sampleOffset,
-          fmt::format("--sample-offset and --spp together have to be at most {}", std::numeric_limits<int>::max()));
+          fmt::format("the sum of --sample-offset and --spp must be at most {}", std::numeric_limits<int>::max()));
   require(integrator != IntegratorKind::path || (illumination.empty() && saveIllumination.empty()),
-          "--illumination and --save-illumination are for guided and product, path has none");
+          "--illumination and --save-illumination require --integrator guided or product");
   require(illumination.empty() || saveIllumination.empty(),
-          "--save-illumination keeps what is trained, but with --illumination nothing is");
-  require(!seconds || (*seconds > 0 && std::isfinite(*seconds)), "--seconds has to be a finite number over 0");
+          "--save-illumination cannot be combined with --illumination, which replaces training");
+  require(!seconds || (*seconds > 0 && std::isfinite(*seconds)), "--seconds must be a finite number greater than 0");
   require(!size || (size->first >= 1 && size->second >= 1 && std::int64_t{size->first} * size->second <= kMaxPixels),
-          fmt::format("--size has to be at least 1x1 and at most {} pixels", kMaxPixels));
-  require(!maxDepth || *maxDepth >= 1, "--max-depth has to be at least 1");
+          fmt::format("--size must be at least 1x1 and at most {} pixels", kMaxPixels));
+  require(!maxDepth || *maxDepth >= 1, "--max-depth must be at least 1");
   require(!trainSeconds || (*trainSeconds > 0 && std::isfinite(*trainSeconds)),
-          "--train-seconds has to be a finite number over 0");
-  require(!trainSeconds || !seconds || *trainSeconds < *seconds, "--train-seconds has to be less than --seconds");
-  require(!passes || *passes >= 1, "--passes has to be at least 1");
-  require(reference.empty() == convergence.empty(), "--reference and --convergence go together");
-  require(reduction >= 0 && std::isfinite(reduction), "--reduction has to be a finite number, at least 0");
-  require(!outputs.empty(), "-o is missing");
-  require(!record || integrator != IntegratorKind::path, "--record is for guided and product: path learns nothing");
-  require(recordImage.extension() == ".png", "--record-image is written as .png");
+          "--train-seconds must be a finite number greater than 0");
+  require(!trainSeconds || !seconds || *trainSeconds < *seconds, "--train-seconds must be less than --seconds");
+  require(!passes || *passes >= 1, "--passes must be at least 1");
+  require(reference.empty() == convergence.empty(), "--reference and --convergence require each other");
+  require(reduction >= 0 && std::isfinite(reduction), "--reduction must be a finite number of at least 0");
+  require(!outputs.empty(), "-o FILE is required");
+  require(!record || integrator != IntegratorKind::path, "--record requires --integrator guided or product");
+  require(recordImage.extension() == ".png", "--record-image must name a .png file");
   try {
     training.validate();
     for (const auto& output : outputs) checkImageName(output);
   } catch (const std::runtime_error& e) {
-    throw UsageError(e.what());  // rules of libraries, which know no command line
+    throw UsageError(e.what());  // libraries check their own limits and do not know the command line
   }
 }
 
@@ -364,8 +368,8 @@ void run(const RenderJob& job) {
     const Stopwatch restoring;
     guiding.training = restoreIllumination(*stored, job.illumination, scene);
     if (job.integrator == IntegratorKind::product && !guiding.training.report.learntFractions)
-      printNote(kTool, fmt::format("{}: its records have learnt no BSDF sampling fractions (trained by guided, or with "
-                                   "--bsdf-fraction fixed): all have {:.1f}",
+      printNote(kTool, fmt::format("{}: the records have learnt no BSDF sampling fractions (trained by guided, or with "
+                                   "--bsdf-fraction fixed); all use {:.1f}",
                                    job.illumination.string(), kInitialBsdfFraction));
     load.restoring = restoring.seconds();
   }
@@ -390,7 +394,7 @@ void run(const RenderJob& job) {
       renderWithProgress(job, camera, *integrator, guiding.training.report.seconds, film, log);
   const RunResult result{rendered, guiding, film.dropped()};
   if (result.dropped > 0)
-    printWarning(kTool, fmt::format("{} samples were negative or not finite and left out", result.dropped));
+    printWarning(kTool, fmt::format("{} samples were negative or not finite, and were discarded", result.dropped));
   const std::uint64_t hash = pictureHash(scene);
   for (const auto& output : job.outputs) writeImage(output, film.mean(), attributes(job, hash, result));
   log.write();

@@ -1,5 +1,5 @@
 #pragma once
-// What loberender does, from options to files.
+// A run of loberender, from the options to the output files.
 
 #include <cstddef>
 #include <filesystem>
@@ -24,34 +24,34 @@ struct RenderJob {
   std::vector<std::filesystem::path> outputs;
 
   IntegratorKind integrator = IntegratorKind::product;
-  std::optional<int> samples;     ///< per pixel; or
-  int sampleOffset = 0;           ///< the first of the samples, of so many a pixel
-  std::optional<double> seconds;  ///< of training and rendering together
+  std::optional<int> samples;     ///< per pixel; exactly one of samples and seconds is set
+  int sampleOffset = 0;           ///< index of the first sample of every pixel
+  std::optional<double> seconds;  ///< for training and rendering together
   std::optional<std::pair<int, int>> size;
-  std::optional<int> maxDepth;  ///< segments
+  std::optional<int> maxDepth;  ///< in segments; empty: max_depth of the scene, or no limit
   RussianRoulette russianRoulette = RussianRoulette::adjoint;
   std::uint64_t seed = 1;
-  float reduction = 0;  ///< threshold of cost up to which the mixtures of both factors are merged; 0: not at all
+  float reduction = 0;  ///< maximum cost of merging the mixtures of both factors (Runnalls 2007); 0: no merging
   TrainingPlan training;
-  std::optional<int> passes;           ///< of training; by default the plan's, or without limit where time is one
-  std::optional<double> trainSeconds;  ///< no pass starts after that; by default a share of seconds, else no limit
+  std::optional<int> passes;  ///< training passes; by default those of the plan, or unlimited if the time is limited
+  std::optional<double> trainSeconds;  ///< training time; by default a fraction of seconds, or no limit
 
-  /// Trained before, instead of training; where to keep what is trained. Empty: neither.
+  /// Files of illumination to load instead of training, and to save after training. Empty: not used.
   std::filesystem::path illumination, saveIllumination;
 
-  std::filesystem::path reference, convergence, stats;  ///< empty: not wanted
+  std::filesystem::path reference, convergence, stats;  ///< empty: not used
 
-  std::optional<std::pair<int, int>> record;         ///< the pixel whose record is drawn
-  std::filesystem::path recordImage = "record.png";  ///< into this file
+  std::optional<std::pair<int, int>> record;         ///< pixel whose illumination record is plotted
+  std::filesystem::path recordImage = "record.png";  ///< file of the plot
 
   /// Throws UsageError that names the option.
   void validate() const;
 };
 
-/// The command that makes the caches a job needs, for messages.
+/// The lobefit command that makes the caches for a job, for error messages.
 std::string lobefitCommand(const RenderJob& job);
 
-/// Reads, trains, renders and writes all outputs; talk goes to stderr. Throws std::runtime_error.
+/// Reads the scene, trains, renders and writes all outputs; diagnostics go to stderr. Throws std::runtime_error.
 void run(const RenderJob& job);
 
 }  // namespace lobe

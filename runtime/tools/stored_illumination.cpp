@@ -13,7 +13,7 @@
 namespace lobe {
 namespace {
 
-/// "kitchen/scene.xml": many scene files are called the same, and their folders differ.
+/// File name with its folder ("kitchen/scene.xml"), because many scene files have the same name.
 std::string nameOf(const std::filesystem::path& sceneFile) {
   const std::filesystem::path whole = std::filesystem::weakly_canonical(sceneFile);
   return (whole.parent_path().filename() / whole.filename()).string();

@@ -1,5 +1,5 @@
 #pragma once
-// Trained illumination kept in a file, so that one training serves other frames of a still scene and other machines.
+// Saves and restores trained illumination, so that it can be reused for other cameras and on other machines.
 
 #include <filesystem>
 
@@ -8,13 +8,13 @@
 
 namespace lobe {
 
-/// Writes what training with the plan has learnt about the scene. sceneFile: where the scene is, for its name. The same
-/// training gives the same bytes. Throws std::runtime_error that names the path.
+/// Writes the illumination that training with the plan produced. sceneFile gives the name of the scene in the file. The
+/// same training produces the same bytes. Throws std::runtime_error that names the path.
 void saveIllumination(const std::filesystem::path& path, const TrainedIllumination& trained, const TrainingPlan& plan,
                       const Scene& scene, const std::filesystem::path& sceneFile);
 
-/// What was saved, for rendering the scene. Throws std::runtime_error that names the path when the file was trained for
-/// another one. The report has no passes and no seconds: nothing was trained now.
+/// Restores saved illumination for rendering the scene. Throws std::runtime_error that names the path if the file was
+/// trained for another scene. The report has no passes and a training time of 0.
 TrainedIllumination restoreIllumination(const IlluminationFile& file, const std::filesystem::path& path,
                                         const Scene& scene);
 

@@ -21,16 +21,17 @@ int fail(const std::string& name, std::string_view message, int code) {
   return code;
 }
 
-/// For messages of libraries, which may be of several lines.
+/// For messages of libraries, which may have several lines.
 std::string asOneLine(std::string message) {
   std::ranges::replace(message, '\n', ' ');
   return message;
 }
 
-/// Of the work: the time left is not told before so much is done, because the first steps may be unlike the others.
+/// The remaining time is not shown before this fraction of the work is done, because the first steps are not
+/// representative.
 constexpr double kMinFractionToExtrapolate = 0.02;
 
-/// Code points, which is what most letters of ours take on a terminal.
+/// Number of code points, which is the width of the text on a terminal for the characters that the tools print.
 std::size_t displayWidth(const std::string& text) {
   return static_cast<std::size_t>(std::ranges::count_if(text, [](char c) { return (c & 0xc0) != 0x80; }));
 }
@@ -42,7 +43,7 @@ std::string formatSeconds(double seconds) {
   return fmt::format("{:.0f} h {:02.0f} min", std::floor(seconds / 3600), std::fmod(seconds, 3600) / 60);
 }
 
-/// Replaces the old name of an option and its old values, with a note.
+/// Replaces the old name and the old values of an option, and prints a note.
 void takeRenamed(const std::string& tool, const RenamedOption& option, std::vector<std::string>& arguments) {
   const auto renameValue = [&](std::string& value) {
     if (const auto found = option.values.find(value); found != option.values.end()) value = found->second;
@@ -58,8 +59,8 @@ void takeRenamed(const std::string& tool, const RenamedOption& option, std::vect
       arguments[i] = option.now;
       if (i + 1 < arguments.size()) renameValue(arguments[i + 1]);
     }
-    printNote(tool, fmt::format("{} is now called {}; the next version will not accept the old name", option.before,
-                                option.now));
+    printNote(tool, fmt::format("{} has been renamed to {}; the next version will not accept the old name",
+                                option.before, option.now));
   }
 }
 
@@ -75,7 +76,7 @@ int runTool(const std::string& name, const std::string& description, int argc, c
     declare(app);
     std::vector<std::string> arguments(argv + std::min(argc, 1), argv + argc);
     for (const RenamedOption& option : renamed) takeRenamed(name, option, arguments);
-    std::ranges::reverse(arguments);  // the order in which CLI11 takes them
+    std::ranges::reverse(arguments);  // CLI11 expects the arguments in reverse order
     app.parse(arguments);
     work();
     if (std::fflush(stdout) != 0) throw std::runtime_error("cannot write to standard output");
@@ -108,14 +109,14 @@ void addDefinitions(CLI::App& app, std::map<std::string, std::string>& definitio
       throw CLI::ValidationError("-D", "expected name=value, not '" + text + "'");
     definitions[text.substr(0, equals)] = text.substr(equals + 1);
   };
-  app.add_option_function<std::string>("-D", parse, "Set $name in the scene (repeatable)")
+  app.add_option_function<std::string>("-D", parse, "Set the scene parameter $NAME to VALUE (repeatable)")
       ->type_name("NAME=VALUE")
       ->trigger_on_parse()
       ->allow_extra_args(false);
 }
 
 void addThreads(CLI::App& app, int& threads) {
-  app.add_option("--threads", threads, "Threads to use (default: all cores)")
+  app.add_option("--threads", threads, "Number of threads (default: all cores)")
       ->check(CLI::Range(1, 4096))
       ->default_str("");
 }

@@ -1,5 +1,5 @@
 #pragma once
-// What all command-line tools share: exit codes, one-line errors, progress, tables. Results go to stdout,
+// Common parts of all command-line tools: exit codes, one-line errors, progress, tables. Results go to stdout,
 // diagnostics to stderr.
 
 #include <chrono>
@@ -15,21 +15,21 @@
 
 namespace lobe {
 
-/// The command line asks for something that makes no sense; runTool prints it and exits with 2.
+/// An invalid command line; runTool prints the message and returns exit code 2.
 class UsageError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// An option that had another name in the version before. values: the old values that have new names, too.
+/// An option whose name changed in this version. values maps old values to new ones.
 struct RenamedOption {
   std::string before, now;
   std::map<std::string, std::string> values = {};
 };
 
-/// Runs a tool: declare adds options to the CLI::App, which parses argv, then work runs. Returns the exit code: 0 done
-/// (also after --help and --version); 1 when work throws; 2 when parsing fails or anything throws UsageError. Errors
-/// go to stderr, "NAME: error: " before each line of their message. Renamed options are accepted with a note.
+/// Runs a tool: declare adds options to the CLI::App, which parses argv, then work runs. Returns the exit code: 0 on
+/// success (also after --help and --version); 1 if work throws; 2 if parsing fails or anything throws UsageError.
+/// Errors go to stderr, with "NAME: error: " before each line of the message. Renamed options are accepted with a note.
 int runTool(const std::string& name, const std::string& description, int argc, char** argv,
             const std::function<void(CLI::App&)>& declare, const std::function<void()>& work,
             const std::vector<RenamedOption>& renamed = {});
@@ -40,15 +40,15 @@ void printWarning(const std::string& name, const std::string& message);
 /// Prints "NAME: note: MESSAGE" to stderr.
 void printNote(const std::string& name, const std::string& message);
 
-/// -D name=value, any number of times, into definitions.
+/// Adds the option -D NAME=VALUE, which may be repeated and fills definitions.
 void addDefinitions(CLI::App& app, std::map<std::string, std::string>& definitions);
 
-/// --threads N, at least 1; threads keeps its value (0: all cores) when the option is not given.
+/// Adds the option --threads N with N ≥ 1; threads keeps its value (0: all cores) if the option is not given.
 void addThreads(CLI::App& app, int& threads);
 
-/// Progress of long work on stderr. On a terminal one line is redrawn at most five times a second, with the time left;
-/// elsewhere a plain line is printed every ten seconds and nothing for shorter work. advance may be called from any
-/// thread. The destructor ends the line.
+/// Shows the progress of long work on stderr. On a terminal, one line with the remaining time is redrawn up to five
+/// times per second; otherwise a new line is printed every ten seconds, and nothing for shorter work. advance may be
+/// called from any thread. The destructor ends the line.
 class Progress {
  public:
   Progress(std::string label, double total);
@@ -71,11 +71,11 @@ class Progress {
   Clock::time_point next_;
 };
 
-/// Columns of text aligned by the widest cell: the first leftColumns to the left, the others to the right.
+/// A text table. The first leftColumns columns are aligned to the left, the others to the right.
 class Table {
  public:
   explicit Table(std::vector<std::string> header, std::size_t leftColumns = 1);
-  /// As many cells as the header has.
+  /// Adds a row, which must have the same number of cells as the header.
   void add(std::vector<std::string> cells);
   void print(std::FILE* out) const;
 

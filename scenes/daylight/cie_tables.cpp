@@ -111,7 +111,7 @@ constexpr std::array<double, 48> kDaylight65 = {
     90.0062, 89.5991, 87.6987, 83.2886, 83.6992, 80.0268, 80.2146, 82.2778, 78.2842, 69.7213, 71.6091, 74.349,
     61.604,  69.8856, 75.087,  63.5927, 46.4182, 66.8054, 63.3828, 64.304,  59.4519, 51.959,  57.4406, 60.3125};
 
-/// The interval of a table of equal steps that a wavelength falls in, and where.
+/// The interval of a uniformly spaced table that contains a wavelength, and the position in it.
 struct Place {
   std::size_t index;
   double fraction;

@@ -20,7 +20,7 @@ double zenithLuminanceOf(double turbidity, double sunAngle) {
   return 1000.0 * ((4.0453 * turbidity - 4.9710) * std::tan(chi) - 0.2155 * turbidity + 2.4192);
 }
 
-/// Cubic in the sun's angle, quadratic in the turbidity: rows are of T², T, 1, columns of θ³, θ², θ, 1.
+/// Cubic in the sun's angle, quadratic in the turbidity: the rows of m belong to T², T, 1, the columns to θ³, θ², θ, 1.
 double zenithChromaticity(const Eigen::Matrix<double, 3, 4>& m, double turbidity, double sunAngle) {
   const double s = sunAngle;
   return Eigen::RowVector3d(turbidity * turbidity, turbidity, 1) * m * Eigen::Vector4d(s * s * s, s * s, s, 1);
@@ -37,7 +37,7 @@ Eigen::Matrix<double, 3, 4> zenithY() {
   return m;
 }
 
-/// Piecewise linear, 0 outside.
+/// A table is interpolated linearly and is 0 outside its range.
 struct Sample {
   double wavelength;  // nm
   double value;
@@ -51,7 +51,8 @@ double interpolate(std::span<const Sample> table, double wavelength) {
   return low.value + t * (above->value - low.value);
 }
 
-// Outside the atmosphere, W/(m² sr nm), every 10 nm from 380 nm (the paper's table 2, with two digits more).
+// Solar spectral radiance outside the atmosphere, W/(m² sr nm), every 10 nm from 380 nm (the paper's table 2, with two
+// digits more).
 constexpr double kSunFirst = 380, kSunStep = 10;
 constexpr std::array kSun = {16559.0, 16233.7, 21127.5, 25888.2, 25829.1, 24232.3, 26760.5, 29658.3, 30545.4, 30057.5,
                              30663.7, 28830.4, 28712.1, 27825.0, 27100.6, 27233.6, 26361.3, 25503.8, 25060.2, 25311.6,
@@ -65,7 +66,8 @@ double sunOutside(double wavelength) {
   return std::lerp(kSun[i], kSun[i + 1], at - static_cast<double>(i));
 }
 
-// Absorption by ozone and water vapour, 1/cm (the same table); that by mixed gases begins where the sun's table ends.
+// Absorption by ozone and water vapour, 1/cm (the same table); absorption by mixed gases begins where the sun's table
+// ends.
 constexpr Sample kOzone[] = {
     {355, 0.0},  {445, .003}, {450, .003}, {455, .004}, {460, .006}, {465, .008}, {470, .009}, {475, .012}, {480, .014},
     {485, .017}, {490, .021}, {495, .025}, {500, .03},  {505, .035}, {510, .04},  {515, .045}, {520, .048}, {525, .057},
@@ -76,7 +78,7 @@ constexpr Sample kOzone[] = {
 constexpr Sample kWater[] = {{689, 0},   {690, 0.016}, {700, 0.024}, {710, 0.0125},
                              {720, 1.0}, {730, 0.87},  {740, 0.061}, {750, 0.001}};
 
-/// What passes through a mass of air, relative to that above one's head.
+/// Transmittance of the atmosphere at a wavelength in nm. airMass: relative to the path towards the zenith.
 double transmittance(double turbidity, double airMass, double wavelength) {
   constexpr double kOzoneDepth = 0.35, kWaterDepth = 2;  // cm
   const double micrometres = wavelength / 1000;

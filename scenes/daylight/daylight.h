@@ -1,8 +1,9 @@
 #pragma once
 // Clear sky and sun: Preetham, Shirley, Smits, "A Practical Analytic Model for Daylight" (SIGGRAPH 1999).
 //
-// Radiance is in W/(m² sr nm), the mean over the visible: luminance over 683 lm/W × ∫ȳ dλ = 106.857 nm. That is what
-// Mitsuba's RGB sky has, and what the sun's spectrum comes to when it is weighted by ȳ. Colours are Rec. 709.
+// Radiance is in W/(m² sr nm), averaged over the visible range: the luminance divided by 683 lm/W × ∫ȳ dλ, where ∫ȳ dλ
+// = 106.857 nm. Mitsuba's RGB sky has this unit, and so has the sun's spectrum after weighting by ȳ. Colours are Rec.
+// 709.
 
 #include <Eigen/Core>
 
@@ -13,13 +14,13 @@ namespace lobe {
 /// The sky of section 3.2: Perez' five-parameter formula for luminance and chromaticity (appendix A.2).
 class PreethamSky {
  public:
-  /// What the fit holds for; below, its zenith would soon be black.
+  /// Lower limit of the model's validity; not far below it, the zenith becomes black.
   static constexpr double kLowestTurbidity = 2;
 
-  /// turbidity: from kLowestTurbidity to 10. sun: unit, towards it, not below the horizon; +y is up.
+  /// turbidity: from kLowestTurbidity to 10. sun: unit direction towards the sun, not below the horizon; +y is up.
   PreethamSky(double turbidity, const Eigen::Vector3d& sun);
 
-  /// From a unit direction above the horizon; black from any other.
+  /// Radiance from a unit direction; black at and below the horizon.
   Rgb radiance(const Eigen::Vector3d& direction) const;
   /// The luminance of the zenith, cd/m² (appendix A.2).
   double zenithLuminance() const { return zenithLuminance_; }
@@ -31,7 +32,7 @@ class PreethamSky {
   };
   struct Channel {
     Perez perez;
-    double scale;  // the zenith's value over the formula's there
+    double scale;  // value at the zenith divided by the formula's value there
   };
   Channel channel(const Perez& perez, double zenith) const;
 
@@ -40,11 +41,11 @@ class PreethamSky {
   Channel luminance_, x_, y_;
 };
 
-/// The disc of the sun seen through the atmosphere (appendix A.1), at this angle from the zenith in radians, at most
-/// π/2. turbidity: from 1 to 10.
+/// Radiance of the sun's disc seen through the atmosphere (appendix A.1). turbidity: from 1 to 10. zenithAngle: in
+/// radians, at most π/2.
 Rgb sunRadiance(double turbidity, double zenithAngle);
 
-/// Of the sun as it is, in radians: half of 0.5358° (Mitsuba's).
+/// Angular radius of the sun in radians: half of 0.5358°, as in Mitsuba.
 double sunRadius();
 
 }  // namespace lobe

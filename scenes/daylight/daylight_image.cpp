@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kPiD = std::numbers::pi;
 
-/// As scene.h has it: polar angle from +y, azimuth from −z towards +x.
+/// The convention of scene.h: polar angle from +y, azimuth from −z towards +x.
 Eigen::Vector3d fromAngles(double polar, double azimuth) {
   return {std::sin(azimuth) * std::sin(polar), std::cos(polar), -std::cos(azimuth) * std::sin(polar)};
 }
@@ -30,8 +30,8 @@ Rgb radianceOf(const SkyDome& dome, const Eigen::Vector3d& world) {
          static_cast<float>(dome.scale);
 }
 
-/// The solid angle that a pixel of this row has in the image interpolated bilinearly, ∫ weight dω: the first and the
-/// last row also have what is beyond their centres, up to the poles.
+/// Solid angle of a pixel of this row under bilinear interpolation, ∫ weight dω. The first and the last row also cover
+/// the range from their centres to the poles.
 double solidAngle(int row, int width, int height) {
   const double step = kPiD / height;
   const double column = 2 * kPiD / width;
@@ -44,8 +44,8 @@ class SunPainter {
  public:
   SunPainter(Image& image, const Eigen::Matrix3d& toWorld) : image_(image), toWorld_(toWorld) {}
 
-  /// Small equal parts of the disc, each shared among the four pixels that its direction is interpolated from: so
-  /// both power and mean direction are kept.
+  /// Distributes small equal parts of the disc to the four pixels that interpolation in their directions uses, which
+  /// preserves both power and mean direction.
   void paint(const SunDisc& sun) const {
     const double pixel = kPiD / image_.height;
     const int parts = std::max(64, static_cast<int>(std::ceil(16 * sun.radius / pixel)));

@@ -1,5 +1,5 @@
 #pragma once
-// Skies and suns as one environment image.
+// Combines skies and suns into one environment map.
 
 #include <vector>
 
@@ -12,15 +12,14 @@ struct SkyDome {
   PreethamSky sky;
   Eigen::Matrix3d toWorld;  ///< rotation
   double scale;
-  /// In [1, 2]: directions are seen this much further down from the zenith than they are, so that 2 wraps the sky
-  /// around the whole sphere (Mitsuba's).
+  /// In [1, 2]: factor by which zenith angles are stretched, as in Mitsuba; 2 wraps the sky around the whole sphere.
   double stretch;
 };
 
-/// A disc in the sky.
+/// A disc of uniform radiance.
 struct SunDisc {
-  Eigen::Vector3d direction;  ///< unit, world space, towards it
-  Rgb irradiance;             ///< on a surface that faces it, whatever its radius (at first order)
+  Eigen::Vector3d direction;  ///< unit, world space, towards the sun
+  Rgb irradiance;             ///< on a surface that faces it; independent of the radius to first order
   double radius;              ///< radians, positive, at most π/2
 };
 
@@ -29,8 +28,8 @@ struct DaylightParts {
   std::vector<SunDisc> suns;
 };
 
-/// The sum of all parts. Interpolated bilinearly, the image holds exactly each sun's irradiance, in the pixels around
-/// its disc. toWorld: the frame that the image is in; width: in pixels, the height is half of that.
+/// The sum of all parts. With bilinear interpolation, the image has exactly the irradiance of each sun, in the pixels
+/// around its disc. toWorld: from the frame of the image. width: in pixels, twice the height.
 Environment bakeDaylight(const DaylightParts& parts, const Eigen::Matrix3d& toWorld, int width);
 
 }  // namespace lobe

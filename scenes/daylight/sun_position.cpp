@@ -12,7 +12,8 @@ double hoursOfUniversalTime(const DateAndPlace& when) {
   return when.hour - when.timezone + (when.minute + when.second / 60) / 60;
 }
 
-/// Since noon of the first of January 2000. The divisions are those of integers, towards zero: they count leap days.
+/// Days since noon of 1 January 2000. The divisions are integer divisions that truncate towards zero; they count leap
+/// days.
 double daysSince2000(const DateAndPlace& when, double hours) {
   const int yearsBack = (when.month - 14) / 12;  // January and February belong to the year before
   const int days = 1461 * (when.year + 4800 + yearsBack) / 4 + 367 * (when.month - 2 - 12 * yearsBack) / 12 -
@@ -48,7 +49,7 @@ Eigen::Vector3d sunDirection(const DateAndPlace& when) {
       std::cos(latitude) * std::cos(hourAngle) * std::cos(declination) + std::sin(declination) * std::sin(latitude);
   const double azimuth = std::atan2(
       -std::sin(hourAngle), std::tan(declination) * std::cos(latitude) - std::sin(latitude) * std::cos(hourAngle));
-  // Seen from the ground instead of from the earth's centre.
+  // Parallax: seen from the ground instead of from the earth's centre.
   constexpr double kEarthRadius = 6371.01, kSunDistance = 149597890;
   const double fromZenith = std::acos(up);
   const double zenith = fromZenith + kEarthRadius / kSunDistance * std::sin(fromZenith);

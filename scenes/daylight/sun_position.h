@@ -1,13 +1,13 @@
 #pragma once
-// Where the sun stands, by the PSA algorithm (Blanco-Muriel, Alarcón-Padilla, López-Moratalla, Lara-Coira: "Computing
-// the solar vector", Solar Energy 70(5), 2001): to about half an arc minute in the years 1999 to 2015, a little worse
-// beyond.
+// Position of the sun by the PSA algorithm (Blanco-Muriel, Alarcón-Padilla, López-Moratalla, Lara-Coira: "Computing the
+// solar vector", Solar Energy 70(5), 2001), accurate to about half an arc minute in the years 1999 to 2015 and slightly
+// less accurate outside them.
 
 #include <Eigen/Core>
 
 namespace lobe {
 
-/// Local time at a place; defaults are Mitsuba's.
+/// Local time and place; the defaults are Mitsuba's.
 struct DateAndPlace {
   int year = 2010, month = 7, day = 10;
   double hour = 15, minute = 0, second = 0;

@@ -1,5 +1,5 @@
 #pragma once
-// How the shapes of a scene file are put into the world.
+// Options for placing the shapes of a scene file in the world.
 
 #include <optional>
 
@@ -9,14 +9,14 @@ namespace lobe {
 
 struct MeshOptions {
   Eigen::Matrix4f toWorld = Eigen::Matrix4f::Identity();  ///< affine and invertible
-  bool faceNormals = false;                               ///< flat triangles: vertex normals are dropped
-  /// Degrees: vertex normals are dropped and made anew, smooth only among triangles of which the normals differ by less
-  /// (Mitsuba's maxSmoothAngle). Not together with faceNormals.
+  bool faceNormals = false;                               ///< flat shading: vertex normals are dropped
+  /// Degrees. Vertex normals are recomputed, smooth only across triangles whose normals differ by less than this angle
+  /// (Mitsuba's maxSmoothAngle). Cannot be combined with faceNormals.
   std::optional<float> maxSmoothAngle;
   bool flipNormals = false;  ///< exchanges front and back
-  /// Turns v around from what the format makes of it: an OBJ's v counts upwards from the image's last row, a PLY's and
-  /// a primitive's v downwards from the first. So Mitsuba's flip_tex_coords differs from its default (true for OBJ,
-  /// false for PLY).
+  /// Flips v relative to the convention of the format: v of an OBJ counts upwards from the last row of the image, v of
+  /// a PLY or primitive downwards from the first. It is set where Mitsuba's flip_tex_coords differs from its default
+  /// (true for OBJ, false for PLY).
   bool flipTexCoords = false;
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-// Meshes in files, whatever their format.
+// Reads mesh files of all formats.
 
 #include <filesystem>
 #include <string>
@@ -14,12 +14,13 @@ namespace lobe {
 struct MeshSource {
   std::string type;  ///< obj, ply or serialized
   std::filesystem::path path;
-  int index = 0;     ///< which of the meshes in a serialized file
-  ObjSelection obj;  ///< of an OBJ
+  int index = 0;     ///< of the mesh in a serialized file
+  ObjSelection obj;  ///< for OBJ files
 };
 
-/// Reads the mesh into the world: one for each of the OBJ's materials, of its faces (empty when there are none), then
-/// one of the rest. Throws std::runtime_error that names the file. Safe to call from several threads.
+/// Reads a file as world-space meshes: for an OBJ, one mesh for each of the selected materials (empty if no face uses
+/// it), then one for the remaining faces; otherwise a single mesh. Throws std::runtime_error that names the file. Safe
+/// to call from several threads.
 std::vector<TriangleMesh> readMeshes(const MeshSource& source, const MeshOptions& options);
 
 }  // namespace lobe

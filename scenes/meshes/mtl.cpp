@@ -62,7 +62,8 @@ class MtlParser {
   float readNumber(std::string_view rest) const {
     const std::string_view word = takeWord(rest);
     const std::optional<double> number = parseReal(word);
-    if (!number) throw std::runtime_error(lines_.describe(lines_.position(), fmt::format("\"{}\" is no number", word)));
+    if (!number)
+      throw std::runtime_error(lines_.describe(lines_.position(), fmt::format("\"{}\" is not a number", word)));
     return static_cast<float>(*number);
   }
 
@@ -78,10 +79,10 @@ class MtlParser {
     return decodeSrgb(colour);
   }
 
-  /// Names may contain blanks; options before the name move or scale the image.
+  /// File names may contain blanks; options before the name shift or scale the image.
   std::string readFile(std::string_view rest, MtlMaterial& material) const {
     if (!rest.starts_with('-')) return std::string(rest);
-    material.faults.push_back(lines_.describe(lines_.position(), "the options of the image have no effect"));
+    material.faults.push_back(lines_.describe(lines_.position(), "the options of the image are ignored"));
     return std::string(rest.substr(rest.find_last_of(" \t") + 1));
   }
 

@@ -9,7 +9,7 @@
 
 namespace lobe {
 
-/// What Mitsuba 0.6 takes of a material; file names are as they are written, empty where there are none.
+/// The parameters of a material that Mitsuba 0.6 uses. File names are as written in the file, empty if not given.
 struct MtlMaterial {
   std::string name;
   Rgb diffuse = Rgb::Zero();        ///< Kd, linear
@@ -21,12 +21,12 @@ struct MtlMaterial {
   std::string specularFile;         ///< map_Ks
   std::string bumpFile;             ///< bump
   std::string opacityFile;          ///< map_d
-  std::vector<std::string> faults;  ///< what is not read as it stands there, one line each
+  std::vector<std::string> faults;  ///< statements that are not read as written, one line each
 };
 
-/// The materials in the order of the file; other statements are passed over, as those before the first `newmtl`. As in
-/// Mitsuba 0.6, colours are encoded as sRGB, and of a number and a file for the same thing the later one counts. Throws
-/// std::runtime_error with line and text for numbers that are none.
+/// The materials in the order of the file. Other statements are ignored, as are those before the first `newmtl`. As in
+/// Mitsuba 0.6, colours are sRGB-encoded, and if a parameter has both a number and a file, the later one is used.
+/// Throws std::runtime_error with line number and text for malformed numbers.
 std::vector<MtlMaterial> parseMtl(std::string_view text);
 
 }  // namespace lobe

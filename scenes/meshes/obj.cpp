@@ -16,12 +16,12 @@ namespace {
 constexpr int kNone = ObjData::kNone;
 using Corner = ObjData::Corner;
 using Face = ObjData::Face;
-/// Faces that share vertices.
+/// Faces that share vertices with each other, but not with those of other runs.
 using Run = std::vector<Face>;
 
 // ---- From faces to parts
 
-/// Keeps the faces that are wanted, and sets their material and mesh as the grouping has them.
+/// Keeps the selected faces, and sets their material and mesh according to the grouping.
 void select(ObjData& data, const ObjSelection& selection) {
   const bool collapsed = selection.grouping == ObjGrouping::collapsed;
   for (Face& face : data.faces) {
@@ -36,7 +36,7 @@ void select(ObjData& data, const ObjSelection& selection) {
   std::erase_if(data.faces, [&](const Face& face) { return face.mesh != selection.mesh; });
 }
 
-/// For each of the data's materials, its place among those to be told apart, or their count.
+/// For each of the data's materials, its index in `wanted`, or the size of `wanted` if it is not there.
 std::vector<std::size_t> partsOfMaterials(const ObjData& data, const std::vector<std::string>& wanted) {
   std::vector<std::size_t> parts;
   for (const std::string& name : data.materials)
@@ -59,7 +59,7 @@ std::vector<std::vector<Run>> divide(const ObjData& data, const ObjSelection& se
 
 // ---- From corners to vertices
 
-/// Gives each distinct corner of a run one vertex. Corners of one position are few, so they are searched one by one.
+/// Creates one vertex for each distinct corner of a run. Few corners share a position, so they are searched linearly.
 class RunBuilder {
  public:
   explicit RunBuilder(const ObjData& data) : data_(data), first_(data.positions.size(), kNone) {}
@@ -69,7 +69,7 @@ class RunBuilder {
     TriangleMesh mesh;
     mesh.triangles.reserve(run.size());
     for (const Face& face : run) addFace(face, mesh);
-    // Only what was used is reset, as a file may have many runs of few faces.
+    // Only used entries are reset, because a file may have many runs of few faces.
     for (const Entry& entry : entries_) first_[entry.corner.position] = kNone;
     entries_.clear();
     return mesh;
@@ -85,7 +85,7 @@ class RunBuilder {
     return {data_.corners.begin() + static_cast<std::ptrdiff_t>(face.begin), face.end - face.begin};
   }
 
-  /// Normals are used when all corners have one, texture coordinates when any has (the others get the origin).
+  /// Normals are used when all corners have one, texture coordinates when any has (the others get (0, 0)).
   void useWhatIsThere(const Run& run, bool faceNormals) {
     useNormals_ = !faceNormals;
     useUvs_ = false;
@@ -111,7 +111,7 @@ class RunBuilder {
       link = &entry.next;
     }
     *link = static_cast<int>(entries_.size());
-    entries_.push_back({corner, kNone});  // link may dangle from here on
+    entries_.push_back({corner, kNone});  // invalidates link
     mesh.positions.push_back(data_.positions[corner.position]);
     if (useNormals_) mesh.normals.push_back(data_.normals[corner.normal]);
     if (useUvs_) mesh.uvs.push_back(corner.uv == kNone ? Vec2(0, 0) : data_.uvs[corner.uv]);
@@ -119,13 +119,13 @@ class RunBuilder {
   }
 
   const ObjData& data_;
-  std::vector<int> first_;  // entry of each position
+  std::vector<int> first_;  // index of the first entry for each position
   std::vector<Entry> entries_;
   std::vector<std::uint32_t> ids_;
   bool useNormals_ = false, useUvs_ = false;
 };
 
-/// Vertices that lack texture coordinates which others have get the origin; with normals, all have them.
+/// Vertices without texture coordinates get (0, 0) if others have some. All vertices have normals.
 void append(TriangleMesh& mesh, const TriangleMesh& more) {
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
   if (!more.uvs.empty() || !mesh.uvs.empty()) {
@@ -161,7 +161,7 @@ std::vector<TriangleMesh> readObjByMaterial(const std::filesystem::path& path, c
   return nameErrors(path, [&] {
     ObjData data = parseObj(readFile(path));
     select(data, selection);
-    if (data.faces.empty()) throw std::runtime_error("holds no triangles");
+    if (data.faces.empty()) throw std::runtime_error("has no triangles");
     RunBuilder builder(data);
     std::vector<TriangleMesh> meshes;
     for (const std::vector<Run>& runs : divide(data, selection)) meshes.push_back(buildPart(runs, builder, options));

@@ -1,5 +1,5 @@
 #pragma once
-// Internal to scenes/: the lines and words of Wavefront's text files (OBJ and MTL).
+// Internal to scenes/: splits Wavefront text files (OBJ and MTL) into lines and words.
 
 #include <cstddef>
 #include <optional>
@@ -8,22 +8,22 @@
 
 namespace lobe {
 
-/// Takes one line after the other. Lines may end by LF, CR or both, and go on after a backslash; a byte order mark
-/// before them does not matter.
+/// Iterates over the lines of a text. Lines end with LF, CR or CR LF, and a backslash at the end of a line continues
+/// it. A leading byte order mark is skipped.
 class ObjLines {
  public:
   explicit ObjLines(std::string_view text);
 
-  /// Without its end; nullopt after the last one. Valid until the next call.
+  /// The next line without its line ending; nullopt after the last one. Valid until the next call.
   std::optional<std::string_view> next();
-  /// Where the line that next() gave last begins.
+  /// Offset of the line that next() returned last.
   std::size_t position() const { return position_; }
 
-  /// "line N: message: "TEXT"", of the line that begins at a position, shortened if it is long.
+  /// "line N: message: "TEXT"" for the line that begins at a position; a long line is shortened.
   std::string describe(std::size_t position, std::string_view message) const;
 
  private:
-  /// One from begin on, which is moved past its end.
+  /// The physical line at begin, which is moved to the next line.
   std::string_view takePhysical(std::size_t& begin) const;
 
   std::string_view text_;
@@ -31,7 +31,7 @@ class ObjLines {
   std::size_t begin_ = 0, position_ = 0;
 };
 
-/// Takes the next word off the line; empty at its end.
+/// Removes the next word from the line and returns it; empty at the end of the line.
 std::string_view takeWord(std::string_view& line);
 
 }  // namespace lobe

@@ -19,7 +19,8 @@ namespace {
 constexpr int kNone = ObjData::kNone;
 constexpr int kTooLarge = std::numeric_limits<int>::max();
 
-/// One of a corner's numbers, up to the next slash, which is taken along; nothing is 0. What overflows is kTooLarge.
+/// Parses one index of a corner up to the next slash, which is consumed. A missing index is 0, one that overflows
+/// kTooLarge.
 bool takeIndex(std::string_view& word, int& index) {
   const std::string_view digits = word.substr(0, word.find('/'));
   word.remove_prefix(std::min(digits.size() + 1, word.size()));
@@ -31,7 +32,8 @@ bool takeIndex(std::string_view& word, int& index) {
   return error != std::errc::invalid_argument && end == digits.data() + digits.size();
 }
 
-/// OBJ counts from 1, or backwards from the latest by negative numbers. What is before the first is kTooLarge.
+/// OBJ indices count from 1, or backwards from the latest element if negative. An index before the first element is
+/// kTooLarge.
 int resolve(int index, std::size_t count) {
   if (index == 0) return kNone;
   if (index == kTooLarge || index > 0) return index == kTooLarge ? kTooLarge : index - 1;
@@ -39,10 +41,10 @@ int resolve(int index, std::size_t count) {
   return resolved >= 0 ? static_cast<int>(resolved) : kTooLarge;
 }
 
-/// Follows `g` and `usemtl` through a file. As in Mitsuba 0.6, they end a mesh when it has faces, and `o` does not.
+/// Tracks `g` and `usemtl` through a file. As in Mitsuba 0.6, they end a mesh that has faces; `o` does not.
 class ObjParts {
  public:
-  /// Whether the line was one of the two. rest: of the line, after its key.
+  /// Returns whether the line was one of the two. rest: the line after its key.
   bool take(std::string_view key, std::string_view rest) {
     if (key != "g" && key != "usemtl") return false;
     if (hasFaces_) ++mesh_;
@@ -93,7 +95,8 @@ class ObjParser {
     material_ = entry->second;
   }
 
-  /// The first three numbers, of which so many are needed; what is not there is zero. All words must be numbers.
+  /// The first three numbers of the line, of which the first `needed` are required; missing ones are zero. All words
+  /// must be numbers.
   Vec3 readNumbers(std::string_view rest, int needed) {
     Vec3 numbers = Vec3::Zero();
     int count = 0;
@@ -102,7 +105,7 @@ class ObjParser {
       if (!value) fail(lines_.position(), fmt::format("\"{}\" is not a number", word));
       if (count < 3) numbers[count] = static_cast<float>(*value);
     }
-    if (count < needed) fail(lines_.position(), fmt::format("{} numbers are needed", needed));
+    if (count < needed) fail(lines_.position(), fmt::format("{} numbers are required", needed));
     return numbers;
   }
 
@@ -119,7 +122,7 @@ class ObjParser {
 
   void readUv(std::string_view rest) {
     const Vec3 uv = readNumbers(rest, 1);
-    // Textures have v downwards, the file upwards.
+    // Textures have v downwards, OBJ files upwards.
     data_.uvs.push_back(uv.allFinite() ? Vec2(uv.x(), 1.0f - uv.y()) : Vec2(0, 0));
   }
 
@@ -133,13 +136,13 @@ class ObjParser {
       data_.corners.push_back({resolve(position, data_.positions.size()), resolve(uv, data_.uvs.size()),
                                resolve(normal, data_.normals.size())});
     }
-    if (data_.corners.size() - begin < 3) fail(lines_.position(), "a face needs three corners or more");
+    if (data_.corners.size() - begin < 3) fail(lines_.position(), "a face needs at least three corners");
     parts_.addFace();
     data_.faces.push_back({begin, data_.corners.size(), material_, parts_.mesh()});
     faceLines_.push_back(lines_.position());
   }
 
-  /// Only at the end, as a face may come before its vertices.
+  /// Done at the end, because a face may precede its vertices.
   void checkIndices() {
     for (std::size_t face = 0; face < faceLines_.size(); ++face)
       for (std::size_t i = data_.faces[face].begin; i < data_.faces[face].end; ++i)
@@ -149,7 +152,7 @@ class ObjParser {
   void checkCorner(ObjData::Corner& corner, std::size_t line) const {
     const auto check = [&](int index, std::size_t count, const char* what) {
       if (index == kNone || static_cast<std::size_t>(index) >= count)
-        fail(line, fmt::format("a face refers to a {} that is not there (there are {})", what, count));
+        fail(line, fmt::format("a face refers to a {} that does not exist (the file has {})", what, count));
     };
     check(corner.position, data_.positions.size(), "vertex");
     if (corner.uv != kNone) check(corner.uv, data_.uvs.size(), "texture coordinate");
@@ -165,8 +168,8 @@ class ObjParser {
   ObjData data_;
   ObjParts parts_;
   std::map<std::string, int> materialIds_{{"", 0}};
-  int material_ = 0;                    // of the faces to come
-  std::vector<std::size_t> faceLines_;  // where they begin
+  int material_ = 0;                    // of the following faces
+  std::vector<std::size_t> faceLines_;  // offsets of the lines of faces
   bool anyBadNormal_ = false;
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-// Internal to scenes/: what the lines of an OBJ file say, before meshes are made of them.
+// Internal to scenes/: the parsed text of an OBJ file, before it is converted to meshes.
 
 #include <string>
 #include <string_view>
@@ -11,39 +11,40 @@ namespace lobe {
 
 struct ObjData {
   static constexpr int kNone = -1;
-  /// Indices from zero into the lists below; kNone for what the corner does not have.
+  /// Indices from zero into the lists below; kNone for an attribute that the corner does not have.
   struct Corner {
     int position, uv, normal;
   };
-  /// The material is an index into ObjData::materials. A mesh ends where a `g` or `usemtl` follows faces; the file's
-  /// meshes are counted from zero.
+  /// The material is an index into ObjData::materials. A mesh ends where a `g` or `usemtl` follows faces; the meshes of
+  /// the file are numbered from zero.
   struct Face {
-    std::size_t begin, end;  ///< of its corners
+    std::size_t begin, end;  ///< range in ObjData::corners
     int material, mesh;
   };
   std::vector<Vec3> positions;
   std::vector<Vec2> uvs;  ///< v downwards
   std::vector<Vec3> normals;
-  std::vector<Corner> corners;  ///< of all faces, one after the other
+  std::vector<Corner> corners;  ///< of all faces, concatenated
   std::vector<Face> faces;
-  /// The names that `usemtl` gives, each once; the first is the empty name of faces before any.
+  /// The distinct names given by `usemtl`; the first is the empty name of faces before any `usemtl`.
   std::vector<std::string> materials{""};
-  int lastMaterial = 0;  ///< that of the last `usemtl`, whether or not faces follow
+  int lastMaterial = 0;  ///< given by the last `usemtl`, even if no faces follow
 };
 
-/// Reads v, vt, vn, f, g and usemtl; other lines are passed over. A normal that is not finite is as if it were not
-/// there, and such a texture coordinate is zero. All indices are in range and all faces have three corners or more.
-/// Throws std::runtime_error with line and text otherwise, and for numbers that are none.
+/// Reads v, vt, vn, f, g and usemtl; other lines are ignored. A normal that is not finite is treated as missing, and a
+/// texture coordinate that is not finite as zero. All indices in the result are in range and all faces have at least
+/// three corners. Throws std::runtime_error with line number and text if the file violates this, and for malformed
+/// numbers.
 ObjData parseObj(std::string_view text);
 
-/// What an OBJ file says of materials, found without reading its geometry.
+/// The material names of an OBJ file, found without parsing its geometry.
 struct ObjMaterials {
-  std::string library;             ///< of the last `mtllib`; empty without one
-  std::vector<std::string> names;  ///< of those that faces have, each once, in the order of the file
-  std::string last;                ///< that of the last `usemtl`
+  std::string library;             ///< given by the last `mtllib`; empty if there is none
+  std::vector<std::string> names;  ///< distinct names of materials that faces use, in the order of the file
+  std::string last;                ///< name given by the last `usemtl`
 };
 
-/// onlyMesh: of the faces of this mesh (see ObjData::Face) only; negative for all.
+/// onlyMesh: considers only the faces of this mesh (see ObjData::Face); negative for all meshes.
 ObjMaterials findObjMaterials(std::string_view text, int onlyMesh);
 
 }  // namespace lobe

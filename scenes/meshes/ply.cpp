@@ -84,11 +84,11 @@ std::uint64_t parseCount(std::string_view text) {
   std::uint64_t count = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
   if (error != std::errc() || end != text.data() + text.size())
-    throw std::runtime_error(fmt::format("\"{}\" is no number of elements", text));
+    throw std::runtime_error(fmt::format("\"{}\" is not a valid number of elements", text));
   return count;
 }
 
-/// Takes one line of the header. False at its end.
+/// Parses one line of the header. Returns false at its end.
 bool parseHeaderLine(std::string_view line, Header& header, bool& formatKnown) {
   const std::vector<std::string_view> words = split(line);
   if (words.empty() || words[0] == "comment" || words[0] == "obj_info") return true;
@@ -103,7 +103,7 @@ bool parseHeaderLine(std::string_view line, Header& header, bool& formatKnown) {
   } else if (words[0] == "property" && words.size() == 5 && words[1] == "list" && !header.elements.empty()) {
     header.elements.back().properties.push_back({std::string(words[4]), parseType(words[3]), parseType(words[2])});
   } else {
-    throw std::runtime_error("a line of the header is not understood");
+    throw std::runtime_error("the header has an unknown line");
   }
   return true;
 }
@@ -118,18 +118,18 @@ Header parseHeader(std::string_view file) {
     const std::size_t end = file.find('\n', ++begin);
     if (end == std::string_view::npos) break;
     if (!parseHeaderLine(file.substr(begin, end - begin), header, formatKnown)) {
-      if (!formatKnown) throw std::runtime_error("the header does not name the format");
+      if (!formatKnown) throw std::runtime_error("the header has no format line");
       header.size = end + 1;
       return header;
     }
     begin = end;
   }
-  throw std::runtime_error("the header does not end");
+  throw std::runtime_error("the header has no end_header line");
 }
 
 // ---- Values
 
-/// Takes one number after the other from the file's body.
+/// Reads numbers from the body of the file.
 class Values {
  public:
   Values(std::string_view body, Format format) : rest_(body), format_(format) {}
@@ -157,16 +157,16 @@ class Values {
     return nextBinary<double>();
   }
 
-  /// The length of a list, no more than there are bytes left.
+  /// The length of a list, which cannot exceed the number of bytes left.
   std::size_t nextCount(Type type) {
     const double count = next(type);
-    if (!(count >= 0 && count == std::floor(count))) throw std::runtime_error("a list has no proper length");
+    if (!(count >= 0 && count == std::floor(count))) throw std::runtime_error("a list has an invalid length");
     if (count > static_cast<double>(rest_.size())) truncated();
     return static_cast<std::size_t>(count);
   }
 
   std::size_t bytesLeft() const { return rest_.size(); }
-  [[noreturn]] static void truncated() { throw std::runtime_error("the file ends too early"); }
+  [[noreturn]] static void truncated() { throw std::runtime_error("the file is truncated"); }
 
  private:
   double nextText() {
@@ -193,12 +193,12 @@ class Values {
   Format format_;
 };
 
-/// The lists of an element that are wanted, by the place of their property; −1 for one that is not there.
+/// Property indices of the lists that are read from an element; −1 for a list that the element does not have.
 constexpr std::size_t kWantedLists = 2;
 using WantedLists = std::array<int, kWantedLists>;
 constexpr WantedLists kNoLists = {-1, -1};
 
-/// What one item of an element holds: a place for each property that is no list, and the wanted lists.
+/// The values of one item of an element: one number per property (unused for lists), and the wanted lists.
 struct Item {
   std::vector<double> scalars;
   std::array<std::vector<double>, kWantedLists> lists;
@@ -228,7 +228,8 @@ void readItem(const Element& element, const WantedLists& wanted, Values& values,
 /// Calls take(item) for each item of the element.
 template <class Take>
 void readElement(const Element& element, const WantedLists& wanted, Values& values, const Take& take) {
-  // Every property takes at least a byte, so a false count ends soon; without properties it would not.
+  // Every property takes at least one byte, so a wrong count soon runs into the end of the file; without properties it
+  // would not.
   if (element.properties.empty()) return;
   Item item{std::vector<double>(element.properties.size()), {}};
   for (std::uint64_t i = 0; i < element.count; ++i) {
@@ -239,7 +240,7 @@ void readElement(const Element& element, const WantedLists& wanted, Values& valu
 
 // ---- Mesh
 
-/// Places of a vector's components among the properties, or nothing when one is missing.
+/// Property indices of a vector's components; negative for a missing component.
 template <std::size_t N>
 struct Places {
   std::array<int, N> place;
@@ -254,12 +255,12 @@ struct Places {
   }
 };
 
-/// Polygons as the file has them, which may give faces before vertices.
+/// The polygons as read. They are assembled later, because a file may have faces before vertices.
 struct PlyData {
   TriangleMesh vertices;  ///< without triangles
   std::vector<std::uint32_t> corners;
-  std::vector<std::size_t> faceEnds{0};  ///< face i has the corners from faceEnds[i] to before faceEnds[i + 1]
-  std::vector<Vec2> cornerUvs;           ///< one for each corner, or none at all
+  std::vector<std::size_t> faceEnds{0};  ///< face i has the corners [faceEnds[i], faceEnds[i + 1])
+  std::vector<Vec2> cornerUvs;           ///< one per corner, or empty
 };
 
 void readVertices(const Element& element, Values& values, TriangleMesh& mesh) {
@@ -282,15 +283,15 @@ void readVertices(const Element& element, Values& values, TriangleMesh& mesh) {
 
 std::uint32_t vertexIndex(double value) {
   if (!(value >= 0 && value == std::floor(value) && value < 4294967296.0))
-    throw std::runtime_error(fmt::format("a face refers to vertex {}, which cannot be", value));
+    throw std::runtime_error(fmt::format("a face refers to vertex {}, which is not a valid index", value));
   return static_cast<std::uint32_t>(value);
 }
 
-/// A face without any gets the origin for all of its corners.
+/// A face without texture coordinates gets (0, 0) for all of its corners.
 void addCornerUvs(const std::vector<double>& numbers, std::size_t corners, std::vector<Vec2>& uvs) {
   if (!numbers.empty() && numbers.size() != 2 * corners)
-    throw std::runtime_error(
-        fmt::format("a face of {} corners has {} texture coordinates, not two for each", corners, numbers.size()));
+    throw std::runtime_error(fmt::format(
+        "a face with {} corners has {} texture coordinate values instead of two per corner", corners, numbers.size()));
   for (const double number : numbers)
     if (!std::isfinite(static_cast<float>(number)))
       throw std::runtime_error("a texture coordinate is not a finite number");
@@ -331,8 +332,8 @@ PlyData parsePly(std::string_view file) {
   return data;
 }
 
-/// Texture coordinates of corners become those of vertices: one vertex for each pair of a file's vertex and
-/// coordinates.
+/// Converts texture coordinates of corners to those of vertices: creates one vertex for each distinct pair of vertex
+/// and texture coordinates.
 void splitByUv(PlyData& data) {
   TriangleMesh split;
   std::map<std::tuple<std::uint32_t, float, float>, std::uint32_t> known;

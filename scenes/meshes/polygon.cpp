@@ -22,8 +22,8 @@ Eigen::Vector3d areaVector(const Corners& corners) {
   return sum;
 }
 
-/// The corners that are left, as a ring. Clipping an ear changes only whether its two neighbours are ears (Eberly,
-/// "Triangulation by Ear Clipping"), so every test is over the ring once, and there are O(n) of them.
+/// The remaining corners as a ring. Clipping an ear affects only whether its two neighbours are ears (Eberly,
+/// "Triangulation by Ear Clipping"), so there are O(n) tests, each of which visits the ring once.
 class EarClipper {
  public:
   explicit EarClipper(const Corners& corners)
@@ -48,8 +48,8 @@ class EarClipper {
  private:
   Triangle triangleAt(std::size_t i) const { return {previous_[i], i, next_[i]}; }
 
-  /// Whether the triangle can be cut off: it is not turned against the polygon, and no other corner lies in it or on
-  /// its edge, where the outline may turn inwards. A straight corner can, as nothing is cut off.
+  /// Whether the corner is an ear: its triangle has the orientation of the polygon, and no other corner lies inside it
+  /// or on its edge, where the outline may turn inwards. A straight corner is an ear, because its triangle has no area.
   bool testEar(std::size_t i) const {
     const auto [before, at, after] = triangleAt(i);
     const Eigen::Vector3d &a = corners_[before], &b = corners_[at], &c = corners_[after];
@@ -65,8 +65,8 @@ class EarClipper {
     return true;
   }
 
-  /// The first from the second corner on; that corner itself where there is none, as in polygons that cross themselves.
-  /// The first corner is never clipped, so that a convex polygon becomes a fan about it.
+  /// The first ear, starting at the second corner; the second corner itself if there is none, as in self-intersecting
+  /// polygons. The first corner is never clipped, so that a convex polygon becomes a fan about it.
   std::size_t findEar() const {
     for (std::size_t i = next_[0]; i != 0; i = next_[i])
       if (isEar_[i]) return i;

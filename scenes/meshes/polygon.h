@@ -1,5 +1,5 @@
 #pragma once
-// Internal to scenes/: polygons into triangles.
+// Internal to scenes/: triangulation of polygons.
 
 #include <array>
 #include <cstddef>
@@ -13,12 +13,13 @@
 
 namespace lobe {
 
-/// Divides a polygon of n ≥ 3 corners, nearly flat, into n − 2 triangles of its corners, wound like it, by clipping
-/// ears in O(n²). Of a convex one it makes the fan about the first corner; one that crosses itself is divided somehow.
+/// Triangulates a nearly planar polygon with n ≥ 3 corners by ear clipping in O(n²): n − 2 triangles of its corners
+/// with the same winding. A convex polygon becomes the fan about its first corner; the result for a self-intersecting
+/// polygon is unspecified.
 std::vector<std::array<std::size_t, 3>> triangulate(const std::vector<Eigen::Vector3d>& corners);
 
-/// Appends the triangles of a polygon, given by three or more indices of the mesh's vertices, of which the positions
-/// are there already.
+/// Appends the triangles of a polygon, given by three or more indices of vertices whose positions are in the mesh
+/// already.
 void appendPolygon(TriangleMesh& mesh, std::span<const std::uint32_t> corners);
 
 }  // namespace lobe

@@ -16,7 +16,7 @@ namespace {
 // Rotations are often written with six digits.
 constexpr float kTolerance = 1e-4f;
 
-/// Appends the square centre ± s ± t with corners of texture coordinates 0 and 1; s × t is its front.
+/// Appends the square centre ± s ± t with texture coordinates from 0 to 1; s × t points to its front.
 void addSquare(TriangleMesh& mesh, const Vec3& centre, const Vec3& s, const Vec3& t) {
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
   for (const Vec2& uv : {Vec2(0, 0), Vec2(1, 0), Vec2(1, 1), Vec2(0, 1)}) {
@@ -28,7 +28,7 @@ void addSquare(TriangleMesh& mesh, const Vec3& centre, const Vec3& s, const Vec3
   mesh.triangles.push_back({first, first + 2, first + 3});
 }
 
-// In double precision, as squares of lengths may leave the range of floats.
+// In double precision, because squares of lengths may exceed the range of floats.
 bool isCircle(const Eigen::Vector3d& u, const Eigen::Vector3d& v) {
   const double square = u.squaredNorm();
   return std::abs(v.squaredNorm() - square) <= 2 * kTolerance * square && std::abs(u.dot(v)) <= kTolerance * square;
@@ -38,7 +38,8 @@ bool mirrors(const Eigen::Matrix3f& linear) {
   return linear.cast<double>().determinant() < 0;
 }
 
-/// The faces are flat, so their own normals serve faceNormals, too, and keep the front under mirroring.
+/// The faces are flat, so their vertex normals are also correct for faceNormals, and they preserve the front under
+/// mirroring.
 TriangleMesh finish(TriangleMesh mesh, MeshOptions options) {
   options.faceNormals = false;
   return toWorldMesh(std::move(mesh), options);
@@ -82,7 +83,7 @@ Sphere makeSphere(const Vec3& centre, float radius, const MeshOptions& options) 
   const Eigen::Matrix3d squares = linear.cast<double>().transpose() * linear.cast<double>();
   const double square = squares.trace() / 3;
   if (!((squares - square * Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= 2 * kTolerance * square))
-    throw std::runtime_error("a sphere's transform must scale all directions alike: ellipsoids are not supported");
+    throw std::runtime_error("a sphere's transform must scale uniformly: ellipsoids are not supported");
   const auto scale = static_cast<float>(std::sqrt(square));
   const Vec3 placed = linear * centre + options.toWorld.topRightCorner<3, 1>();
   requireInRange(placed, Vec3::Constant(radius * scale));
@@ -102,7 +103,7 @@ Cylinder makeCylinder(const Vec3& start, const Vec3& end, float radius, const Me
   };
   if (!isCircle(u.cast<double>(), v.cast<double>()) || !upright(u) || !upright(v))
     throw std::runtime_error(
-        "a cylinder's transform must keep it round and upright: elliptic and oblique ones are not supported");
+        "a cylinder's transform must keep it circular and upright: elliptic and oblique ones are not supported");
   const Vec3 base = linear * start + options.toWorld.topRightCorner<3, 1>();
   requireInRange(base, u.cwiseAbs() + v.cwiseAbs() + axis.cwiseAbs());
   return {base, u, v, axis, options.flipNormals};

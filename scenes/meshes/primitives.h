@@ -1,6 +1,6 @@
 #pragma once
-// Mitsuba's simple shapes. A transform that mirrors keeps the front where the transformed normal points. Each throws
-// std::runtime_error when the transform is singular, not finite or not affine.
+// Mitsuba's simple shapes. Under a mirroring transform, the front stays on the side of the transformed normal. Each
+// function throws std::runtime_error when the transform is singular, not finite or not affine.
 
 #include "scenes/meshes/mesh_options.h"
 #include "scenes/scene.h"
@@ -13,14 +13,14 @@ TriangleMesh makeRectangle(const MeshOptions& options);
 /// [-1,1]³, front outwards; uv covers [0,1]² on every face.
 TriangleMesh makeCube(const MeshOptions& options);
 
-/// The unit disk in the plane z = 0, front towards +z; any transform makes an ellipse of it.
+/// The unit disk in the plane z = 0, front towards +z; a general transform makes it an ellipse.
 Disk makeDisk(const MeshOptions& options);
 
-/// radius > 0. std::runtime_error: the transform makes an ellipsoid of it.
+/// radius > 0. Throws std::runtime_error when the transform would make it an ellipsoid.
 Sphere makeSphere(const Vec3& centre, float radius, const MeshOptions& options);
 
-/// The side of a cylinder about the segment from start to end; radius > 0. As Mitsuba's, its texture starts at an
-/// azimuth of no meaning. std::runtime_error: the transform does not keep it a right circular cylinder.
+/// The lateral surface of a cylinder about the segment from start to end; radius > 0. As in Mitsuba, its texture starts
+/// at an arbitrary azimuth. Throws std::runtime_error when the transform does not keep it a right circular cylinder.
 Cylinder makeCylinder(const Vec3& start, const Vec3& end, float radius, const MeshOptions& options);
 
 }  // namespace lobe

@@ -17,7 +17,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "the files are little-endian");
 
 constexpr std::uint16_t kMagic = 0x041c;
-// A byte compressed by zlib never stands for more than this many.
+// Upper bound of zlib's compression ratio.
 constexpr std::uint64_t kMaxExpansion = 1032;
 
 enum Flags : std::uint32_t {
@@ -32,17 +32,17 @@ enum Flags : std::uint32_t {
 template <class T>
 T readValue(std::istream& file) {
   T value{};
-  if (!file.read(reinterpret_cast<char*>(&value), sizeof(T))) throw std::runtime_error("the file is cut short");
+  if (!file.read(reinterpret_cast<char*>(&value), sizeof(T))) throw std::runtime_error("the file is truncated");
   return value;
 }
 
-/// What stands at `begin` and how the file numbers its meshes.
+/// Reads the file format's magic number and version at `begin`; the version determines the width of offsets.
 std::uint16_t readVersion(std::istream& file, std::uint64_t begin) {
   file.seekg(static_cast<std::streamoff>(begin));
   if (readValue<std::uint16_t>(file) != kMagic) throw std::runtime_error("not a serialized mesh");
   const auto version = readValue<std::uint16_t>(file);
   if (version != 3 && version != 4)
-    throw std::runtime_error(fmt::format("version {} is not read, only 3 and 4", version));
+    throw std::runtime_error(fmt::format("version {} is not supported, only 3 and 4", version));
   return version;
 }
 
@@ -50,7 +50,7 @@ struct Extent {
   std::uint64_t begin, end;
 };
 
-/// From the table at the end of the file: offsets of 8 bytes (4 in version 3), then how many there are.
+/// Looks up a mesh in the table at the end of the file: offsets of 8 bytes (4 in version 3), then their number.
 Extent findMesh(std::istream& file, std::uint64_t size, int index) {
   const std::uint64_t width = readVersion(file, 0) == 4 ? 8 : 4;
   file.seekg(static_cast<std::streamoff>(size - 4));
@@ -70,14 +70,15 @@ Extent findMesh(std::istream& file, std::uint64_t size, int index) {
   return extent;
 }
 
-/// Unpacks a stream from memory piece by piece.
+/// Decompresses a stream in memory incrementally.
 class Inflater {
  public:
   explicit Inflater(std::string packed) : packed_(std::move(packed)) {
-    if (packed_.size() > std::numeric_limits<uInt>::max()) throw std::runtime_error("a mesh of over 4 GB");
+    if (packed_.size() > std::numeric_limits<uInt>::max())
+      throw std::runtime_error("compressed meshes over 4 GB are not supported");
     stream_.next_in = reinterpret_cast<Bytef*>(packed_.data());
     stream_.avail_in = static_cast<uInt>(packed_.size());
-    if (inflateInit(&stream_) != Z_OK) throw std::runtime_error("cannot unpack");
+    if (inflateInit(&stream_) != Z_OK) throw std::runtime_error("cannot initialise zlib");
   }
   Inflater(const Inflater&) = delete;
   Inflater& operator=(const Inflater&) = delete;
@@ -90,10 +91,10 @@ class Inflater {
     return result;
   }
 
-  /// The count comes from the file: what cannot be there is not asked memory for.
+  /// The count comes from the file, so it is checked before memory is allocated.
   template <class T>
   std::vector<T> values(std::uint64_t count) {
-    if (count > kMaxExpansion * packed_.size() / sizeof(T)) throw std::runtime_error("a count in it is damaged");
+    if (count > kMaxExpansion * packed_.size() / sizeof(T)) throw std::runtime_error("an element count is damaged");
     std::vector<T> result(count);
     fill(result.data(), count * sizeof(T));
     return result;
@@ -109,7 +110,7 @@ class Inflater {
       const int status = inflate(&stream_, Z_NO_FLUSH);
       const uInt done = piece - stream_.avail_out;
       if (done == 0 || (status != Z_OK && status != Z_STREAM_END))
-        throw std::runtime_error("the mesh is damaged or cut short");
+        throw std::runtime_error("the mesh is damaged or truncated");
       out += done;
       bytes -= done;
     }
@@ -173,7 +174,7 @@ TriangleMesh readFrom(const std::filesystem::path& path, int index, MeshOptions 
   const int version = readVersion(file, extent.begin);
   std::string packed(extent.end - extent.begin - 4, '\0');
   if (!file.read(packed.data(), static_cast<std::streamsize>(packed.size())))
-    throw std::runtime_error("the file is cut short");
+    throw std::runtime_error("the file is truncated");
   Inflater in(std::move(packed));
   TriangleMesh mesh = unpack(in, version, options.faceNormals);
   return toWorldMesh(std::move(mesh), options);

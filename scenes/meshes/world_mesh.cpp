@@ -19,7 +19,7 @@ namespace {
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-/// Normalised in double precision, as squares of small or large floats leave their range; zero stays zero.
+/// Normalises in double precision, because squares of small or large floats exceed their range; zero stays zero.
 Vec3 unit(const Eigen::Vector3d& v) {
   const double length = v.norm();
   return length > 0 ? Vec3((v / length).cast<float>()) : Vec3::Zero();
@@ -55,7 +55,7 @@ double angleAt(const TriangleMesh& mesh, const Triangle& t, int corner) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
-/// Unit, or zero for triangles without area.
+/// Unit normals of the triangles; zero for those without area.
 std::vector<Eigen::Vector3d> faceNormals(const TriangleMesh& mesh) {
   std::vector<Eigen::Vector3d> normals;
   normals.reserve(mesh.triangles.size());
@@ -78,9 +78,9 @@ std::vector<Vec3> smoothNormals(const TriangleMesh& mesh) {
   return normals;
 }
 
-/// Gives triangles vertices of their own where their normals differ by the angle or more. As in Mitsuba 0.6, vertices
-/// count as one when they are equal, whatever their indices, and the triangles around one are grouped greedily: the
-/// first that is left takes all that are near it.
+/// Splits vertices between triangles whose normals differ by the angle or more. As in Mitsuba 0.6, vertices with equal
+/// positions and texture coordinates are treated as one, whatever their indices, and the triangles around a vertex are
+/// grouped greedily: the first remaining one takes all whose normals are close to its own.
 class SmoothingSplitter {
  public:
   SmoothingSplitter(const TriangleMesh& mesh, float degrees)
@@ -116,7 +116,7 @@ class SmoothingSplitter {
     return n == m || n.dot(m) > threshold_;
   }
 
-  /// corners: of equal vertices; the order of those that are left is kept.
+  /// corners: those of equal vertices. The remaining corners keep their order.
   void splitVertex(std::span<std::size_t> corners) {
     while (!corners.empty()) {
       const std::size_t first = corners.front();
@@ -141,7 +141,7 @@ class SmoothingSplitter {
   TriangleMesh result_;
 };
 
-/// Winds every triangle so that its front is on its vertex normals' side.
+/// Winds every triangle so that its front is on the side of its vertex normals.
 void windByNormals(TriangleMesh& mesh) {
   for (Triangle& t : mesh.triangles) {
     const Vec3 mean = mesh.normals[t[0]] + mesh.normals[t[1]] + mesh.normals[t[2]];
@@ -165,7 +165,7 @@ void turnOver(TriangleMesh& mesh) {
 }  // namespace
 
 Eigen::Matrix3f checkedLinear(const Eigen::Matrix4f& toWorld) {
-  if (!toWorld.allFinite()) throw std::runtime_error("its transform holds numbers that are not finite");
+  if (!toWorld.allFinite()) throw std::runtime_error("its transform has numbers that are not finite");
   if (toWorld.row(3) != Eigen::RowVector4f(0, 0, 0, 1)) throw std::runtime_error("its transform is not affine");
   Eigen::Matrix3f linear = toWorld.topLeftCorner<3, 3>();
   if (linear.cast<double>().determinant() == 0) throw std::runtime_error("its transform is singular");
@@ -173,7 +173,7 @@ Eigen::Matrix3f checkedLinear(const Eigen::Matrix4f& toWorld) {
 }
 
 TriangleMesh toWorldMesh(TriangleMesh mesh, const MeshOptions& options) {
-  if (mesh.triangles.empty()) throw std::runtime_error("holds no triangles");
+  if (mesh.triangles.empty()) throw std::runtime_error("has no triangles");
   if (options.faceNormals) mesh.normals.clear();
   requireFinite(mesh);
   transform(mesh, options.toWorld);

@@ -6,7 +6,7 @@ namespace lobe {
 namespace {
 
 void check(const char* name, const Rgb& colour) {
-  // Negated, so that it holds for what is no number.
+  // Negated, so that it also rejects NaN.
   if (!((colour >= 0.0f).all() && (colour <= kLargestEmission).all()))
     throw ParameterError(name, fmt::format("{} must be neither negative nor over {:g}, but is {} {} {}", name,
                                            kLargestEmission, colour.x(), colour.y(), colour.z()));

@@ -34,7 +34,7 @@ struct Encoding {
   std::size_t markLength = 0;  // of the byte order mark
 };
 
-/// By the byte order mark, or by how the first '<' of a file without one looks.
+/// Detects the encoding by the byte order mark or, without one, by the bytes of the first '<'.
 Encoding detectedByBytes(std::string_view bytes) {
   static constexpr std::pair<std::string_view, const char*> kMarks[] = {{"\xef\xbb\xbf"sv, "UTF-8"},
                                                                         {"\xff\xfe\0\0"sv, "UTF-32LE"},
@@ -76,7 +76,7 @@ std::string toUtf8(const std::filesystem::path& path, std::string_view bytes, co
   const std::unique_ptr<void, CloseConverter> converter(opened);
   std::string text;
   char block[4096];
-  std::string input(bytes);  // iconv does not promise to leave it alone
+  std::string input(bytes);  // iconv takes a pointer to non-const bytes
   char* in = input.data();
   std::size_t left = input.size();
   while (left > 0) {
@@ -86,7 +86,7 @@ std::string toUtf8(const std::filesystem::path& path, std::string_view bytes, co
     text.append(block, out);
     if (result == static_cast<std::size_t>(-1) && errno != E2BIG)
       throw SceneError(placeIn(path, text, text.size()),
-                       fmt::format("this is not {}, which the file is said to be in", encoding));
+                       fmt::format("invalid bytes for the file's encoding {}", encoding));
   }
   return text;
 }
@@ -117,7 +117,7 @@ std::string placeIn(const std::filesystem::path& path, std::string_view text, co
   offset = std::min(offset, text.size());
   const auto next = std::ranges::upper_bound(lines, offset);
   const std::string_view before = text.substr(*(next - 1), offset - *(next - 1));
-  // Bytes that continue a UTF-8 character do not count.
+  // Continuation bytes of UTF-8 characters are not counted.
   const auto column = std::ranges::count_if(before, [](char c) { return (c & 0xc0) != 0x80; }) + 1;
   return fmt::format("{}:{}:{}", path.string(), next - lines.begin(), column);
 }

@@ -1,5 +1,5 @@
 #pragma once
-// Scene files as UTF-8, whatever they are stored in.
+// Reads scene files in any encoding as UTF-8.
 
 #include <filesystem>
 #include <string>
@@ -8,10 +8,10 @@
 
 namespace lobe {
 
-/// The file's content in UTF-8, without a byte order mark. Its encoding is that of its byte order mark (UTF-8, UTF-16,
-/// UTF-32), or the one that its XML declaration names, or else UTF-8; what is UTF-8 already stays as it is. Throws
-/// SceneError at the file (or at the offending byte) when it cannot be read, is empty, names an encoding that is not
-/// known, or is not in the encoding that it names.
+/// The file's content in UTF-8, without a byte order mark. Its encoding is given by its byte order mark (UTF-8, UTF-16,
+/// UTF-32), else by its XML declaration, else it is UTF-8; UTF-8 text is returned unchanged. Throws SceneError at the
+/// file (or at the offending byte) when it cannot be read, is empty, names an unknown encoding, or is not valid in its
+/// encoding.
 std::string readXmlText(const std::filesystem::path& path);
 
 /// The offsets at which the lines of a text begin.

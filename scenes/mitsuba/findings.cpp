@@ -10,7 +10,7 @@ namespace lobe {
 namespace {
 
 constexpr std::size_t kMostLines = 10;
-/// Of faults; a file with more is not what it is taken for.
+/// Limit on kinds of faults: a file with more of them is probably not a scene.
 constexpr std::size_t kMostKinds = 10000;
 
 std::string andMore(std::size_t count) {
@@ -22,13 +22,13 @@ std::size_t total(const std::vector<Fault>& faults) {
                          [](std::size_t sum, const Fault& fault) { return sum + fault.count; });
 }
 
-/// Whether lenient reading gets past all of them.
+/// Whether lenient reading tolerates all of them.
 bool areTolerable(const std::vector<Fault>& faults) {
   return std::ranges::none_of(faults, [](const Fault& fault) { return fault.consequence.empty(); });
 }
 
 std::string describe(const std::vector<Fault>& faults) {
-  if (faults.empty()) return "it depends on what is at fault";
+  if (faults.empty()) return "it depends on something that has a fault";
   if (faults.size() == 1) return faults.front().text();
   const std::size_t shown = std::min(kMostLines, faults.size());
   std::string lines;
@@ -54,7 +54,7 @@ SceneError::SceneError(std::vector<Fault> all) : std::runtime_error(describe(all
 void Findings::fault(std::string where, const std::string& kind, std::string message, std::string consequence) {
   const auto [entry, isNew] = faultOfKind_.try_emplace(kind, faults_.size());
   if (isNew && faults_.size() >= kMostKinds) throw SceneError(faults_);
-  // Definitions are read again after each included file.
+  // Definitions are read again after each included file, so the same fault may be reported twice.
   if (!places_.insert(fmt::format("{} {}", where, kind)).second) return;
   if (isNew)
     faults_.push_back({std::move(where), std::move(message), std::move(consequence)});
@@ -66,7 +66,7 @@ void Findings::warn(const std::string& where, const std::string& kind, const std
   const auto [entry, isNew] = warningOfKind_.try_emplace(kind, warnings_.size());
   if (isNew) warnings_.push_back({where, message, 0});
   Warning& warning = warnings_[entry->second];
-  // What is looked at twice is found twice.
+  // An element that is read twice repeats its warnings.
   if (warning.count == 0 || warning.where != where) ++warning.count;
 }
 
@@ -94,7 +94,7 @@ std::vector<std::string> Findings::notes() const {
   std::vector<std::string> parts;
   for (const auto& [owner, parameters] : withoutEffect_)
     parts.push_back(fmt::format("{} of {}", fmt::join(parameters, ", "), owner));
-  lines.push_back(fmt::format("without effect on the picture: {}", fmt::join(parts, "; ")));
+  lines.push_back(fmt::format("parameters without effect on the picture: {}", fmt::join(parts, "; ")));
   return lines;
 }
 

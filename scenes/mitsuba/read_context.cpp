@@ -28,7 +28,8 @@ bool ReadContext::attempt(const std::string& consequence, const std::function<vo
 
 Nesting::Nesting(const ReadContext& context, pugi::xml_node node, int& depth) : depth_(depth) {
   constexpr int kDeepest = 100;
-  if (depth >= kDeepest) context.file.fail(node, fmt::format("<{}>s nested more than {} deep", node.name(), kDeepest));
+  if (depth >= kDeepest)
+    context.file.fail(node, fmt::format("<{}> elements nested more than {} deep", node.name(), kDeepest));
   ++depth_;
 }
 
@@ -65,19 +66,18 @@ void rejectText(const ReadContext& context, pugi::xml_node node) {
   const std::size_t begin = std::min(text.find_first_not_of(kBlanks), text.size());
   const std::string_view word = text.substr(begin, text.find_first_of(kBlanks, begin) - begin);
   context.file.fail(SceneFile::location(node) + static_cast<std::ptrdiff_t>(begin),
-                    fmt::format("text \"{}\" where an element is needed", word));
+                    fmt::format("unexpected text \"{}\" between elements", word));
 }
 
 void rejectMedium(ReadContext& context, pugi::xml_node node) {
-  context.unsupported(node, "medium", "participating media are not rendered",
-                      "the medium is left out and space is clear");
+  context.unsupported(node, "medium", "participating media are not supported", "the medium is left out");
 }
 
 pugi::xml_node resolveReference(const ReadContext& context, pugi::xml_node ref) {
   const pugi::xml_attribute id = ref.attribute("id");
   if (!id) context.file.fail(ref, "<ref> needs an id");
   const pugi::xml_node target = context.file.byId(id.value());
-  if (!target) context.file.fail(ref, fmt::format("nothing has the id \"{}\"", id.value()));
+  if (!target) context.file.fail(ref, fmt::format("there is no element with the id \"{}\"", id.value()));
   return target;
 }
 

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::string_view kKnown =
     "alias, bsdf, default, emitter, film, include, integrator, medium, path, rfilter, sampler, sensor, shape, texture";
-/// Nothing to read where they stand: SceneFile has seen to them, or something may refer to them.
+/// Elements that need not be read here: they have been handled by SceneFile, or are read where they are referenced.
 constexpr std::array<std::string_view, 7> kElsewhere = {"alias", "default", "film",   "medium",
                                                         "path",  "rfilter", "sampler"};
 
@@ -69,8 +69,8 @@ class SceneReader {
       context_.unsupported(context_.file.scene(), "scale", error.what(), "");
     }
     if (context_.scene.scale != 1.0f)
-      context_.note(
-          fmt::format("all lengths are multiplied by {:g}: the scene is far from ordinary size", context_.scene.scale));
+      context_.note(fmt::format("all lengths are multiplied by {:g}, because the scene is extremely large or small",
+                                context_.scene.scale));
   }
 
   void readFirstIntegrator(pugi::xml_node node) {
@@ -82,7 +82,7 @@ class SceneReader {
   void readFirstSensor(pugi::xml_node node) {
     if (sensor_) return context_.note("only the first of several sensors is used");
     sensor_ = true;
-    // Without a camera there is no picture: lenient reading does not get past its faults.
+    // Nothing can be rendered without a camera, so lenient reading does not tolerate its faults.
     context_.attempt("", [&] { readSensor(context_, node); });
   }
 
@@ -101,11 +101,11 @@ class SceneReader {
   bool sensor_ = false, integrator_ = false;
 };
 
-/// Without shapes and environment, what is at fault was all there is.
+/// Reports a fault when lenient reading has left neither shapes nor an environment.
 void checkSomethingIsLeft(const std::filesystem::path& path, const Scene& scene, const ReadOptions& options,
                           Findings& findings) {
   if (options.lenient && options.geometry && !findings.faults().empty() && scene.shapes.empty() && !scene.environment)
-    findings.fault(path.string(), "nothing left", "without what is at fault nothing is left to draw", "");
+    findings.fault(path.string(), "nothing left", "nothing is left to draw after leaving out what has faults", "");
 }
 
 Scene read(const std::filesystem::path& path, const ReadOptions& options, Findings& findings) {
@@ -117,7 +117,7 @@ Scene read(const std::filesystem::path& path, const ReadOptions& options, Findin
   return scene;
 }
 
-/// Whether what was read of a scene with these faults may not be used.
+/// Whether a scene with these faults must not be used.
 bool mustRefuse(const std::vector<Fault>& faults, const ReadOptions& options) {
   if (faults.empty()) return false;
   return !options.lenient || std::ranges::any_of(faults, [](const Fault& fault) { return fault.consequence.empty(); });

@@ -13,28 +13,29 @@
 namespace lobe {
 
 struct ReadOptions {
-  /// Values for $name, over the file's <default>s.
+  /// Values for $name, which override the file's <default>s.
   std::map<std::string, std::string> definitions;
-  /// Leave out or replace what is at fault and warn (once per kind) instead of failing.
+  /// Leave out or replace faulty parts with a warning (once per kind) instead of failing.
   bool lenient = false;
-  /// false: materials only, no meshes or environment (the fitter's need).
+  /// false: read only materials, no meshes or environment, as the fitter needs.
   bool geometry = true;
-  /// Told the share of the meshes just read; from any thread.
+  /// Called from any thread after each mesh, with the fraction of all meshes that it is (increments that sum to 1).
   std::function<void(double)> onProgress = {};
 };
 
-/// Reads the whole file before it throws SceneError with all faults found; with options.lenient only when nothing is
-/// left to draw. Meshes are read in parallel with oneTBB.
+/// Reads the whole file, then throws SceneError with all faults found; with options.lenient, only if nothing is left to
+/// draw or there is no camera. Meshes are read in parallel with oneTBB.
 Scene readScene(const std::filesystem::path& path, const ReadOptions& options = {});
 
 /// What readScene finds in a file.
 struct SceneCheck {
-  std::vector<Fault> faults;  ///< also those that options.lenient gets past
+  std::vector<Fault> faults;  ///< including those that options.lenient tolerates
   std::vector<std::string> warnings, notes;
   bool readable = false;  ///< readScene with the same options does not throw
 };
 
-/// Reads as readScene does, and returns all that it finds. Throws only what is not the file's fault.
+/// Reads the file like readScene and returns everything that it finds. Throws only exceptions that are not caused by
+/// the file.
 SceneCheck checkScene(const std::filesystem::path& path, const ReadOptions& options = {});
 
 }  // namespace lobe

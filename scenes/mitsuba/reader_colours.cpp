@@ -38,12 +38,12 @@ std::optional<Rgb> parseXyz(std::string_view text) {
   return rgbOfXyz(Eigen::Vector3d(values->data()));
 }
 
-/// The curve in the file of this name. Throws std::runtime_error that names it.
+/// The spectrum in the file of this name. Throws std::runtime_error that names it.
 SpectrumPoints readSpectrumFile(const ReadContext& context, const std::string& name, std::ptrdiff_t location) {
   const std::filesystem::path path = context.file.resolve(name, location);
   return nameErrors(path, [&] {
     const std::optional<SpectrumPoints> points = parseSpectrumFile(readFile(path));
-    if (!points) throw std::runtime_error("does not hold lines of a wavelength, rising, and a value");
+    if (!points) throw std::runtime_error("each line must have a wavelength, greater than the last, and a value");
     return *points;
   });
 }
@@ -63,8 +63,9 @@ Rgb readSpectrum(const ReadContext& context, pugi::xml_node node) {
     valueText(context, node);  // checks the other attributes
     return rgbOfSpectrum(*points, illuminantOf(context, node));
   }
-  // One number is the same at all wavelengths, and yet grey, in emitters, too: Mitsuba's RGB modes have it so.
-  return parsedValue<Rgb>(context, node, parseColour, "one or three numbers, or pairs of wavelength:value, rising");
+  // A single number is a constant spectrum, but it is converted to grey even in emitters, as in Mitsuba's RGB modes.
+  return parsedValue<Rgb>(context, node, parseColour,
+                          "one or three numbers, or wavelength:value pairs with increasing wavelengths");
 }
 
 bool isTemperature(double kelvin) {
@@ -88,7 +89,7 @@ float scaleOf(const Parameters& parameters) {
   return static_cast<float>(parameters.number("scale", 1.0));
 }
 
-/// The first of the names that is there.
+/// The first of the names that is given.
 const char* nameGiven(const Parameters& parameters, std::initializer_list<const char*> names) {
   for (const char* name : names)
     if (parameters.has(name)) return name;
@@ -136,12 +137,14 @@ SpectrumPoints readCurve(const ReadContext& context, const std::string& type, co
   const bool regular = type == "regular";
   const std::optional<SpectrumPoints> points =
       spectrumOf(regular ? equallySpaced(parameters, values.size()) : numbersIn(parameters, "wavelengths"), values);
-  if (!points) throw ParameterError("values", "a spectrum needs two or more wavelengths, rising, and a value for each");
+  if (!points)
+    throw ParameterError("values", "a spectrum needs two or more increasing wavelengths and a value for each");
   return *points;
 }
 
 Rgb makeCurve(const ReadContext& context, pugi::xml_node node, const std::string& type, const Parameters& parameters) {
-  if (parameters.has("value")) return parameters.colour("value", Rgb::Zero());  // pairs, already seen as a colour
+  if (parameters.has("value"))
+    return parameters.colour("value", Rgb::Zero());  // wavelength:value pairs, already converted
   return rgbOfSpectrum(readCurve(context, type, parameters), illuminantOf(context, node));
 }
 

@@ -44,7 +44,7 @@ DateAndPlace readDateAndPlace(const Parameters& parameters) {
   return when;
 }
 
-/// In the emitter's frame, from date and place or as the file gives it in world space.
+/// The sun's direction in the emitter's frame, from date and place or from sun_direction, which is in world space.
 Eigen::Vector3d readSunDirection(const Parameters& parameters, const Eigen::Matrix3d& toWorld) {
   if (!parameters.has("sun_direction")) return sunDirection(readDateAndPlace(parameters));
   for (const char* name : kPlaceAndTime)
@@ -59,7 +59,7 @@ void checkAboveHorizon(const Parameters& parameters, const Eigen::Vector3d& sun)
   const double degrees = -std::asin(std::max(-1.0, sun.y())) * 180 / std::numbers::pi;
   throw ParameterError(
       parameters.has("sun_direction") ? "sun_direction" : "hour",
-      fmt::format("the sun is {:.1f} degrees below the horizon: there is no model of the night", degrees));
+      fmt::format("the sun is {:.1f} degrees below the horizon: night skies are not supported", degrees));
 }
 
 Eigen::Vector3d stretched(const Eigen::Vector3d& direction, double stretch) {
@@ -70,8 +70,8 @@ Eigen::Vector3d stretched(const Eigen::Vector3d& direction, double stretch) {
   return {direction.x() * factor, std::cos(polar), direction.z() * factor};
 }
 
-/// In radians: Mitsuba 0.6 scales that of the sun, Mitsuba 3 takes an angle over the disc in degrees. Both keep what
-/// light comes from it.
+/// Angular radius of the sun in radians. Mitsuba 0.6 scales the true radius, Mitsuba 3 takes the angular diameter in
+/// degrees. Neither changes the irradiance.
 double readSunRadius(const Parameters& parameters) {
   constexpr double kDegree = std::numbers::pi / 180;
   if (!parameters.has("sun_aperture"))
@@ -83,7 +83,7 @@ double readSunRadius(const Parameters& parameters) {
 
 }  // namespace
 
-/// What would change the picture, where it is asked for.
+/// Reports switches that are on and would change the picture.
 void DaylightReader::checkSwitches(pugi::xml_node node, const Parameters& parameters, const std::string& type) {
   const auto refuse = [&](const char* name, const char* what) {
     if (parameters.flag(name, false))
@@ -91,8 +91,8 @@ void DaylightReader::checkSwitches(pugi::xml_node node, const Parameters& parame
                            fmt::format("{}: {} is not supported: {}", describe(node), name, what),
                            fmt::format("{} is ignored", name));
   };
-  if (type != "sun") refuse("extend", "there is no sky below the horizon");
-  if (type != "sky") refuse("complex_sun", "the sun's disc is equally bright everywhere");
+  if (type != "sun") refuse("extend", "the sky ends at the horizon");
+  if (type != "sky") refuse("complex_sun", "the sun's disc has uniform radiance");
 }
 
 bool DaylightReader::knows(std::string_view type) {
@@ -118,14 +118,14 @@ bool DaylightReader::read(pugi::xml_node node, const Parameters& parameters, con
   const double radius = type == "sky" ? 0 : readSunRadius(parameters);
   if (type != "sun" && parameters.has("albedo")) {
     parameters.colour("albedo", Rgb::Zero());
-    parameters.warn("albedo", "albedo is ignored: the sky is Preetham's, over black ground");
+    parameters.warn("albedo", "albedo is ignored: Preetham's sky does not depend on the ground");
   }
-  // Nothing is kept before everything has been read: what throws is read again.
+  // Nothing is stored before everything has been read, because an element that throws is read again.
   if (!any()) frame_ = toWorld;
   width_ = std::max(width_, width);
   if (type != "sun") {
     if (turbidity < PreethamSky::kLowestTurbidity)
-      context_.note(fmt::format("{}: a sky of turbidity {} is that of {}, the lowest that Preetham's model has",
+      context_.note(fmt::format("{}: turbidity {} is replaced by {}, the lowest of Preetham's sky model",
                                 describe(node), turbidity, PreethamSky::kLowestTurbidity));
     const double clearest = std::max(turbidity, PreethamSky::kLowestTurbidity);
     parts_.skies.push_back({PreethamSky(clearest, sun), toWorld, skyScale, stretch});

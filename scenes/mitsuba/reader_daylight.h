@@ -11,11 +11,11 @@ class DaylightReader {
   explicit DaylightReader(ReadContext& context) : context_(context) {}
 
   static bool knows(std::string_view type);
-  /// Keeps what the element says. Throws SceneError.
+  /// Reads the element and keeps the result for finish(). Throws SceneError.
   void add(pugi::xml_node node, const Parameters& parameters, const std::string& type);
   /// Whether add has been called.
   bool any() const { return width_ > 0; }
-  /// Puts all that was added into the scene: one environment, and a directional light for each sun of radius 0.
+  /// Adds the sum of all elements to the scene: one environment, and a directional light for each sun of radius 0.
   void finish();
 
  private:
@@ -25,7 +25,7 @@ class DaylightReader {
 
   ReadContext& context_;
   DaylightParts parts_;
-  Eigen::Matrix3d frame_ = Eigen::Matrix3d::Identity();  // of the first emitter: there, the image has its horizon
+  Eigen::Matrix3d frame_ = Eigen::Matrix3d::Identity();  // of the first emitter: the frame of the image
   int width_ = 0;
 };
 

@@ -47,9 +47,9 @@ Vec3 readPosition(const Parameters& parameters) {
   return position;
 }
 
-/// Where +z of the emitter's frame points to.
+/// The world-space direction of +z of the emitter's frame.
 Vec3 readAxis(const Parameters& parameters, const Vec3& axis) {
-  const Eigen::Vector3d wide = axis.cast<double>();  // its square may be no float
+  const Eigen::Vector3d wide = axis.cast<double>();  // its square may exceed the range of floats
   if (!(wide.norm() > 0.0))
     throw ParameterError(parameters.has("direction") ? "direction" : "to_world", "the light's direction is zero");
   return wide.normalized().cast<float>();
@@ -63,7 +63,7 @@ PointLight makePoint(const Parameters& parameters) {
 /// y.
 ProjectedTexture makeProjected(TexturePtr texture, const Eigen::Matrix4f& frame, double perX, double perY) {
   const Vec3 x = frame.block<3, 1>(0, 0).normalized(), y = frame.block<3, 1>(0, 1).normalized();
-  // Negated, so that it holds for what is no number.
+  // Negated, so that it also rejects NaN.
   if (!(x.norm() > 0.0f && y.norm() > 0.0f))
     throw ParameterError("to_world", "the transform of a light with a texture must not be singular");
   return {std::move(texture), x * static_cast<float>(perX), y * static_cast<float>(perY)};
@@ -99,7 +99,7 @@ SpotLight makeSpot(const Parameters& parameters) {
           makeSpotTexture(parameters, frame, cutoff)};
 }
 
-/// As a camera sees: the first pixel of the image is at +x and +y.
+/// Oriented like the view of a camera: the first pixel of the image is at +x and +y.
 ProjectorLight makeProjector(const Parameters& parameters) {
   if (!parameters.has("irradiance")) throw ParameterError("", "the parameter \"irradiance\" is needed");
   TexturePtr irradiance = emissionTexture(parameters, "irradiance", grey(1.0f));
@@ -139,7 +139,7 @@ void EmitterReader::add(pugi::xml_node node) {
   const std::string type = typeOf(context_, node);
   if (type == "area") {
     if (node.attribute("id")) return;  // for shapes to refer to
-    context_.file.fail(node, "an area emitter must stand inside a shape, or have an id for shapes to refer to");
+    context_.file.fail(node, "an area emitter must be inside a shape, or have an id for shapes to refer to");
   }
   if (std::ranges::find(kTypes, type) == kTypes.end()) {
     context_.unsupported(node, "emitter " + type,
@@ -162,7 +162,7 @@ void EmitterReader::addDelta(pugi::xml_node node, const Parameters& parameters, 
   const DeltaLight light = makeFrom(context_, node, parameters, [&](const Parameters& p) {
     weight = readSamplingWeight(context_, node, p);
     if (weight == 0.0)
-      p.warn("sampling_weight", "with a sampling_weight of 0, nothing finds this light: it is left out");
+      p.warn("sampling_weight", "a light with a sampling_weight of 0 is never sampled: it is left out");
     return makeDelta(type, p);
   });
   if (context_.options.geometry && weight > 0.0) context_.scene.lights.push_back(light);
@@ -172,7 +172,7 @@ void EmitterReader::addDistant(pugi::xml_node node, const Parameters& parameters
   const bool daylight = DaylightReader::knows(type);
   if (environment_ || (daylight_.any() && !daylight))
     context_.file.fail(
-        node, "a second environment: there may be one constant or envmap, or any number of sky, sun and sunsky");
+        node, "a second environment: only one constant or envmap, or any number of sky, sun and sunsky, is supported");
   if (daylight) return daylight_.add(node, parameters, type);
   environment_ = true;
   std::optional<Environment> environment = makeFrom(context_, node, parameters, [&](const Parameters& p) {

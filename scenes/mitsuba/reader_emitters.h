@@ -1,5 +1,5 @@
 #pragma once
-// Emitters of scene files that stand outside shapes.
+// Emitters of scene files outside shapes.
 
 #include "scenes/mitsuba/reader_daylight.h"
 #include "scenes/mitsuba/reader_textures.h"
@@ -11,11 +11,11 @@ class EmitterReader {
   EmitterReader(ReadContext& context, TextureReader& textures)
       : context_(context), textures_(textures), daylight_(context) {}
 
-  /// A point-like emitter goes to the scene's lights, a constant or envmap becomes its environment; skies and suns are
-  /// left for finish. Without geometry, only checks what can be checked without an image. Throws SceneError, also for
-  /// an environment besides another.
+  /// Adds a point, spot, projector or directional emitter to the scene's lights; a constant or envmap becomes its
+  /// environment; skies and suns are added by finish(). Without geometry, checks only what can be checked without an
+  /// image. Throws SceneError, also for a second environment.
   void add(pugi::xml_node node);
-  /// Makes the environment of skies and suns.
+  /// Creates the environment from skies and suns.
   void finish() { daylight_.finish(); }
 
  private:
@@ -25,7 +25,7 @@ class EmitterReader {
   ReadContext& context_;
   TextureReader& textures_;
   DaylightReader daylight_;
-  bool environment_ = false;  // a constant or envmap was there
+  bool environment_ = false;  // whether there was a constant or envmap
 };
 
 }  // namespace lobe

@@ -19,7 +19,7 @@ bool namesImage(pugi::xml_node node, bool environment) {
          (environment && elementName(node) == "emitter" && type == "envmap");
 }
 
-/// The parameters that matter here, as far as they make sense; faults are found later, when the element is read.
+/// The image request from those parameters that are valid; faults are reported later, when the element is read.
 std::optional<ImageRequest> peek(const ReadContext& context, pugi::xml_node node, bool linear) {
   Parameters parameters;
   for (const pugi::xml_node child : node.children()) {
@@ -41,7 +41,7 @@ bool isNormalMap(pugi::xml_node node) {
   return elementName(node) == "bsdf" && std::string_view(node.attribute("type").value()) == "normalmap";
 }
 
-/// linear: the node's images are read without regard to what they say of their encoding.
+/// linear: the node's images are linear, whatever encoding they state.
 void collect(const ReadContext& context, pugi::xml_node node, bool linear, std::vector<ImageRequest>& requests) {
   if (namesImage(node, context.options.geometry))
     if (const std::optional<ImageRequest> request = peek(context, node, linear)) requests.push_back(*request);
@@ -53,7 +53,8 @@ Encoding encodingOf(const ReadContext& context, const Parameters& parameters) {
   const bool raw = parameters.flag("raw", false);
   const double gamma = parameters.number("gamma", -1.0);
   if (gamma != -1.0 && !(gamma >= 0.0))
-    throw ParameterError("gamma", "gamma must be positive, or -1 for sRGB, or 0 for what the file has");
+    throw ParameterError("gamma",
+                         "gamma must be positive, or -1 for sRGB, or 0 for the encoding that the image file states");
   if (raw || gamma == 1.0) return {Encoding::Kind::linear, 1.0f};
   if (gamma == 0.0 || (!parameters.has("gamma") && !context.file.isOfToday())) return {Encoding::Kind::tagged, 1.0f};
   if (gamma == -1.0) return {Encoding::Kind::srgb, 1.0f};
@@ -84,7 +85,7 @@ std::shared_ptr<const Image> withoutFaults(ReadContext& context, pugi::xml_node 
   const auto isFaulty = [sign](const Rgb& p) { return !p.allFinite() || (sign == Sign::positive && (p < 0.0f).any()); };
   const auto count = std::ranges::count_if(image->pixels, isFaulty);
   if (count == 0) return image;
-  context.note(fmt::format("{}: {}: {} of {} pixels are {}not finite, and count as black", describe(node),
+  context.note(fmt::format("{}: {}: {} of {} pixels are {}not finite and are replaced by black", describe(node),
                            request.path.string(), count, image->pixels.size(),
                            sign == Sign::positive ? "negative or " : ""));
   auto sound = std::make_shared<Image>(*image);

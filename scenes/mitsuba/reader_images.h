@@ -1,5 +1,5 @@
 #pragma once
-// The images of a scene: each file is read once, all at once by all cores.
+// The images of a scene. Each file is read once, and all files are read in parallel.
 
 #include <map>
 #include <memory>
@@ -14,37 +14,39 @@
 
 namespace lobe {
 
-/// The file of an image and how its numbers are meant.
+/// The file of an image and the encoding of its values.
 struct ImageRequest {
   std::filesystem::path path;
   Encoding encoding;
-  bool alpha = false;  ///< of its alpha channel alone
+  bool alpha = false;  ///< read only its alpha channel
 };
 
-/// From the parameters filename, raw and gamma (1 is linear, −1 sRGB, 0 what the file says) of an environment map. In
-/// files for Mitsuba 0.6, 0 is what there is without a gamma.
+/// From the parameters filename, raw and gamma of an environment map. gamma: 1 is linear, −1 is sRGB, 0 is the encoding
+/// stated by the image file. The default is 0 in files for Mitsuba 0.6, and −1 in newer ones.
 ImageRequest imageRequest(const ReadContext& context, const Parameters& parameters);
 
-/// The same for a bitmap, which may have a channel, too.
+/// The same for a bitmap, which may also have a channel.
 ImageRequest bitmapRequest(const ReadContext& context, const Parameters& parameters);
 
-/// The parameter channel in small letters; empty when there is none.
+/// The parameter channel in lower case; empty when there is none.
 std::string channelOf(const Parameters& parameters);
 
-/// What an image's numbers may be.
+/// The sign that the values of an image may have.
 enum class Sign { positive, any };
 
-/// The image with black for pixels that are not finite or not of this sign, and a note when there are any.
+/// The image with black in place of pixels that are not finite or do not have this sign; adds a note when there are
+/// any.
 std::shared_ptr<const Image> withoutFaults(ReadContext& context, pugi::xml_node node, const ImageRequest& request,
                                            std::shared_ptr<const Image> image, Sign sign);
 
 class ImageStore {
  public:
-  /// Reads every image the file's bitmaps (and environment maps, where geometry is wanted) name, in parallel. Faults
-  /// are kept until the image is asked for.
+  /// Reads the images of all the file's bitmaps (and environment maps, if geometry is read) in parallel. Errors are
+  /// kept until the image is requested.
   explicit ImageStore(const ReadContext& context);
 
-  /// nullptr when the file is missing and that is tolerated. SceneError at the filename parameter.
+  /// Returns nullptr, after reporting a fault with `remedy` as its consequence, when the file does not exist. Throws
+  /// SceneError at the filename parameter when it cannot be read.
   std::shared_ptr<const Image> get(ReadContext& context, pugi::xml_node node, const Parameters& parameters,
                                    const ImageRequest& request, const std::string& remedy);
 

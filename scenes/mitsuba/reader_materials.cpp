@@ -14,7 +14,8 @@ namespace {
 
 constexpr int kMostParts = 1000;
 
-/// children: of the nested BSDFs. What a measured BSDF has from its file is in its lobes' keys.
+/// children: fingerprints of the nested BSDFs. The data in the file of a measured BSDF is covered by the keys of its
+/// lobes.
 std::uint64_t fingerprintOf(const std::string& type, const Parameters& parameters,
                             std::span<const std::uint64_t> children, const Bsdf& bsdf) {
   Fingerprint hash;
@@ -25,9 +26,10 @@ std::uint64_t fingerprintOf(const std::string& type, const Parameters& parameter
   return hash.value();
 }
 
-/// What models leave to the version of the file. Mitsuba 0.6 keeps reflectances from exceeding 1. From 2 on a metal
-/// that is not named is a perfect mirror (η 0, k 1) rather than copper, and the opacity of a mask is a number rather
-/// than a colour. From 3 (3.7) on mapped normals face the viewer and shadow their terminator.
+/// Defaults that depend on the version of the file. Mitsuba 0.6 keeps reflectances from exceeding 1. From version 2, a
+/// metal that is not named is a perfect mirror (η = 0, k = 1) rather than copper, and the opacity of a mask is a number
+/// rather than a colour. From version 3 (3.7), normals of bump and normal maps are flipped towards the viewer, and a
+/// shadowing function is applied at their terminator.
 void setDefaults(const std::string& type, int version, Parameters& parameters) {
   if (version < 2) return parameters.setDefault("ensure_energy_conservation", true);
   if (type == "conductor" || type == "roughconductor") parameters.setDefault("material", std::string("none"));
@@ -89,7 +91,7 @@ MaterialReader::Made MaterialReader::make(pugi::xml_node node) {
         "diffuse 0.5 is used");
     return makeDiffuseOf(0.5f);
   }
-  // Directions are no colours, and neither are heights.
+  // Normals and heights are not colours.
   const Encoded encoded = type == "normalmap" ? Encoded::linear
                           : type == "bumpmap" ? Encoded::asGivenSigned
                                               : Encoded::asGiven;
@@ -104,9 +106,9 @@ MaterialReader::Made MaterialReader::make(pugi::xml_node node) {
     return true;
   };
   Parameters parameters = readParameters(context_, node, "texture, bsdf, ref", onChild);
-  // Every look at the BSDF looks at all of them, and each that is referred to twice doubles them.
+  // Evaluating the BSDF evaluates all of them, and one that is referenced twice is evaluated twice.
   if (parts > kMostParts)
-    context_.file.fail(node, fmt::format("{}: more than {} bsdfs nested in one", describe(node), kMostParts));
+    context_.file.fail(node, fmt::format("{}: more than {} nested bsdfs", describe(node), kMostParts));
   setDefaults(type, context_.file.majorVersion(), parameters);
   if (namesMeasurement(node) && !resolveFile(node, parameters)) return makeDiffuseOf(0.5f);
   const BsdfPtr bsdf = makeFrom(context_, node, parameters, [&](const Parameters& p) { return makeBsdf(type, p); });
@@ -114,12 +116,12 @@ MaterialReader::Made MaterialReader::make(pugi::xml_node node) {
 }
 
 bool MaterialReader::resolveFile(pugi::xml_node node, Parameters& parameters) {
-  if (!parameters.holdsText("filename")) return true;  // the model says what is wrong
+  if (!parameters.holdsText("filename")) return true;  // makeBsdf reports the error
   const std::ptrdiff_t location = parameters.location("filename");
   const std::filesystem::path path = context_.file.resolve(parameters.text("filename", ""), location);
   if (!std::filesystem::exists(path)) {
     context_.unsupported(location, "missing file " + path.string(),
-                         fmt::format("{}: {} is not there", describe(node), path.string()), "diffuse 0.5 is used");
+                         fmt::format("{}: {} does not exist", describe(node), path.string()), "diffuse 0.5 is used");
     return false;
   }
   parameters.set("filename", path.string(), location);

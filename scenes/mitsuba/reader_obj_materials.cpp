@@ -29,7 +29,7 @@ std::vector<std::pair<std::string, int>> ObjMaterialReader::read(pugi::xml_node 
   std::vector<std::pair<std::string, int>> result;
   for (const std::string& name : found.names) {
     if (std::ranges::find(source.obj.materials, name) != source.obj.materials.end()) continue;
-    // Of several materials of one name the last one counts.
+    // If several materials have the same name, the last one is used.
     const auto material = std::find_if(known.rbegin(), known.rend(), [&](const auto& m) { return m.name == name; });
     if (material != known.rend()) result.emplace_back(name, use(place, *material));
   }
@@ -42,7 +42,7 @@ ObjMaterials ObjMaterialReader::find(const MeshSource& source) const {
     if (source.obj.grouping == ObjGrouping::collapsed) found.names = {found.last};
     return found;
   } catch (const std::runtime_error&) {
-    return {};  // the reader of the mesh says why
+    return {};  // reported when the mesh is read
   }
 }
 
@@ -92,7 +92,7 @@ MaterialReader::Made ObjMaterialReader::make(const Place& place, const MtlMateri
   return made;
 }
 
-/// What becomes of the numbers of illumination models is Mitsuba's choice.
+/// Maps the numbers of illumination models to BSDFs as in Mitsuba 0.6.
 MaterialReader::Made ObjMaterialReader::makeModel(const Place& place, const MtlMaterial& material) {
   Parameters parameters;
   const int model = material.illumination;
@@ -112,7 +112,7 @@ MaterialReader::Made ObjMaterialReader::makeModel(const Place& place, const MtlM
 
 MaterialReader::Made ObjMaterialReader::makeOf(const Place& place, const MtlMaterial& material, const std::string& type,
                                                Parameters parameters, const std::vector<std::uint64_t>& children) {
-  // Mitsuba 0.6, the only one to read libraries, keeps reflectances from exceeding 1.
+  // Mitsuba 0.6, the only version that reads libraries, keeps reflectances from exceeding 1.
   parameters.setDefault("ensure_energy_conservation", true);
   return makeFrom(context_, place.shape, std::move(parameters), [&](const Parameters& p) {
     try {
@@ -134,7 +134,7 @@ TexturePtr ObjMaterialReader::texture(const Place& place, const std::string& fil
   const std::filesystem::path path = resolve(place, file);
   if (isThere(path)) return textures_.readFile(place.shape, place.location, path, encoded);
   context_.warn(place.location, "missing image " + path.string(),
-                fmt::format("{}: {}: image {} is not there: black is used", describe(place.shape),
+                fmt::format("{}: {}: image {} does not exist: black is used", describe(place.shape),
                             place.library.string(), path.string()));
   return constantTexture(Rgb::Zero());
 }

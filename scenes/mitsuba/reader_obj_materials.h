@@ -1,5 +1,5 @@
 #pragma once
-// The materials of OBJ files that have a library (MTL) of their own, as Mitsuba 0.6 makes them.
+// Materials from the libraries (MTL) of OBJ files, as in Mitsuba 0.6.
 
 #include <map>
 #include <string>
@@ -18,23 +18,24 @@ class ObjMaterialReader {
   ObjMaterialReader(ReadContext& context, TextureReader& textures, MaterialReader& materials)
       : context_(context), textures_(textures), materials_(materials) {}
 
-  /// Names and indices in Scene::materials of what the library has for the OBJ's selected faces; nothing for the names
-  /// that the selection has already. A library or image that is not there is warned of, at the location, which is that
-  /// of the OBJ's name in the shape. An OBJ that cannot be read has no materials.
+  /// Names and indices in Scene::materials of the library's materials for the OBJ's selected faces, except those whose
+  /// names the selection contains already. A missing library or image causes a warning at the location, which is that
+  /// of the OBJ's file name in the shape. An OBJ that cannot be read has no materials.
   std::vector<std::pair<std::string, int>> read(pugi::xml_node shape, std::ptrdiff_t location,
                                                 const MeshSource& source);
 
  private:
-  /// What all that is read for one shape has in common.
+  /// The common context of everything that is read for one shape.
   struct Place {
     pugi::xml_node shape;
     std::ptrdiff_t location;
     std::filesystem::path folder;   ///< of the OBJ
-    std::filesystem::path library;  ///< empty without one
+    std::filesystem::path library;  ///< empty if there is none
   };
 
   ObjMaterials find(const MeshSource& source) const;
-  /// A file that the OBJ or its library names: beside the OBJ, or where the scene's files are.
+  /// Path of a file that the OBJ or its library names: in the folder of the OBJ, or where files of the scene are
+  /// searched.
   std::filesystem::path resolve(const Place& place, std::string name) const;
   const std::vector<MtlMaterial>& library(const Place& place);
   int use(const Place& place, const MtlMaterial& material);

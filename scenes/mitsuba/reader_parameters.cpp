@@ -20,9 +20,9 @@ namespace {
 constexpr std::string_view kValueElements =
     "float, integer, boolean, string, rgb, srgb, xyz, spectrum, blackbody, point, vector, transform";
 
-/// Parameters of Mitsuba's that do not change what a picture converges to: how things are stored and found, and what
-/// belongs to other integrators, to files that we do not write, or to motion, which we do not read. An element without
-/// a type stands for all its types.
+/// Mitsuba parameters that do not change the converged picture: storage and acceleration, settings of other
+/// integrators, output files that are not written, and motion, which is not supported. An element without a type stands
+/// for all its types.
 constexpr std::pair<std::string_view, std::string_view> kWithoutEffect[] = {
     {"texture \"bitmap\"", "accel, cache, format, max_anisotropy"},
     {"emitter \"constant\"", "to_world"},
@@ -50,7 +50,7 @@ Rgb readPoint(const ReadContext& context, pugi::xml_node node) {
   return readVector(context, node, 0).cast<float>().array();
 }
 
-/// nullopt: not an element that holds a value.
+/// nullopt for an element that does not hold a value.
 std::optional<ParameterValue> readValue(ReadContext& context, pugi::xml_node node) {
   const std::string_view tag = node.name();
   if (tag == "float") return parsedValue<double>(context, node, parseNumber, "a number");
@@ -165,7 +165,7 @@ std::string requiredText(const Parameters& parameters, const std::string& name) 
 Eigen::Matrix3f rotationOf(const Parameters& parameters, const char* name) {
   Eigen::Matrix3d m = parameters.transform(name).topLeftCorner<3, 3>();
   m /= std::cbrt(std::abs(m.determinant()));
-  // Negated, so that it holds for a singular matrix (NaN).
+  // Negated, so that it also rejects a singular matrix (NaN).
   if (!((m.transpose() * m).isIdentity(1e-3)))
     throw ParameterError(name, fmt::format("{} of an environment must be a rotation", name));
   return m.cast<float>();
@@ -177,7 +177,7 @@ Eigen::Matrix4f toWorld(const Parameters& parameters) {
 
 void requireInRange(const Vec3& position, const char* name) {
   if (!isInRange(position))
-    throw ParameterError(name, fmt::format("a place at {:g}, {:g}, {:g}: coordinates over {:g} are not supported",
+    throw ParameterError(name, fmt::format("the position is {:g}, {:g}, {:g}: coordinates over {:g} are not supported",
                                            position.x(), position.y(), position.z(), kLargestCoordinate));
 }
 

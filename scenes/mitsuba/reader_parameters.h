@@ -1,5 +1,5 @@
 #pragma once
-// The children of a scene file's element as named parameters.
+// Reads the children of a scene file's element as named parameters.
 
 #include <functional>
 #include <string>
@@ -12,39 +12,41 @@
 
 namespace lobe {
 
-/// Told of each child that is no plain value, with references already followed, and the name that its parent knows it
-/// by, as it is written (may be empty). Returns whether such a child has its place here.
+/// Called for each child that is not a plain value, with references already resolved. name: the child's name attribute
+/// as written (may be empty). Returns whether such a child is allowed here.
 using ChildHandler = std::function<bool(pugi::xml_node child, const std::string& name, Parameters& parameters)>;
 
-/// The plain values among the children, names in snake_case; points and vectors are colours, integers are numbers. What
-/// else there is goes to onChild; knownChildren lists for messages what that takes. Throws SceneError.
+/// The plain values among the children, with names in snake_case; points and vectors become colours, integers become
+/// numbers. All other children are passed to onChild; knownChildren lists, for messages, those that it accepts. Throws
+/// SceneError.
 Parameters readParameters(ReadContext& context, pugi::xml_node node, const std::string& knownChildren,
                           const ChildHandler& onChild);
 
 /// The same for elements without other children.
 Parameters readParameters(ReadContext& context, pugi::xml_node node);
 
-/// Warns that a parameter is given again at this element: the last one is used.
+/// Warns at this element that a parameter is given again: the last one is used.
 void warnOfRepetition(ReadContext& context, pugi::xml_node node, const std::string& name);
 
-/// A fault for every parameter that nobody asked for, or a warning in files below version 2, whose renderer ignores
-/// them; a note for those that do not change the picture.
+/// Reports a fault for every parameter that was never queried, or a warning in files below version 2, because their
+/// renderer ignores such parameters; a note for those that do not change the picture.
 void checkUnused(ReadContext& context, pugi::xml_node node, const Parameters& parameters);
 
-/// Passes on what the makers of the element noted and warned of.
+/// Reports the notes and warnings that were added to the parameters while the element was made.
 void passOnRemarks(ReadContext& context, pugi::xml_node node, const Parameters& parameters);
 
-/// Throws SceneError: with this fault, or with none when something in the element could not be read already.
+/// Throws SceneError with this fault, or without a fault when another part of the element could not be read, which has
+/// been reported already.
 [[noreturn]] void failUnlessIncomplete(const ReadContext& context, pugi::xml_node node, const Parameters& parameters,
                                        std::string_view message);
 
-/// Parameters that a model refuses, one after the other.
+/// Collects the parameters that a model rejects.
 class RefusedParameters {
  public:
-  /// Erases the parameter that the error names. Throws SceneError when it names none that is there: the element itself
-  /// is refused, for the last parameter's sake if there was one.
+  /// Erases the parameter that the error names. If there is no such parameter, the element itself is rejected: throws
+  /// SceneError with the fault of the last erased parameter or, if there is none, with this error.
   void erase(ReadContext& context, pugi::xml_node node, Parameters& parameters, const ParameterError& error);
-  /// A fault for each.
+  /// Reports a fault for each of them.
   void report(ReadContext& context) const;
 
  private:
@@ -55,9 +57,9 @@ class RefusedParameters {
   std::vector<Refused> all_;
 };
 
-/// make(parameters), with its notes and warnings passed on; afterwards checkUnused. A parameter that make refuses by a
-/// ParameterError is a fault, and make is called again without it, so that it must leave nothing behind when it throws.
-/// SceneError: the element itself is refused.
+/// Returns make(parameters), reports its notes and warnings, and calls checkUnused. When make rejects a parameter by a
+/// ParameterError, this is reported as a fault, and make is called again without the parameter, so it must not have
+/// side effects when it throws. Throws SceneError when the element itself is rejected.
 template <typename Make>
 auto makeFrom(ReadContext& context, pugi::xml_node node, Parameters parameters, Make&& make) {
   RefusedParameters refused;
@@ -74,20 +76,21 @@ auto makeFrom(ReadContext& context, pugi::xml_node node, Parameters parameters, 
   }
 }
 
-/// The text parameter that must be there, else a ParameterError.
+/// A required text parameter. Throws ParameterError when it is missing.
 std::string requiredText(const Parameters& parameters, const std::string& name);
 
-/// The rotation in a transform of something infinitely far away, where a uniform scale and a translation do not matter.
-/// ParameterError when there is more in it.
+/// The rotation in the transform of something infinitely far away, for which a uniform scale and a translation have no
+/// effect. Throws ParameterError when it contains anything else.
 Eigen::Matrix3f rotationOf(const Parameters& parameters, const char* name);
 
-/// As floats, for the world of shapes and cameras.
+/// The parameter to_world in single precision.
 Eigen::Matrix4f toWorld(const Parameters& parameters);
 
-/// The same for what stands at its origin. ParameterError when that is too far away (see scene_scale.h).
+/// The same for an object at the origin of its local frame. Throws ParameterError when it is too far away (see
+/// scene_scale.h).
 Eigen::Matrix4f placeInWorld(const Parameters& parameters);
 
-/// ParameterError of that name when the position is too far away.
+/// Throws ParameterError with this name when the position is too far away.
 void requireInRange(const Vec3& position, const char* name);
 
 }  // namespace lobe

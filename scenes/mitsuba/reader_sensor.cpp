@@ -17,12 +17,12 @@ namespace {
 
 constexpr std::array<std::string_view, 5> kAxes = {"x", "y", "diagonal", "smaller", "larger"};
 
-/// Mitsuba's when a film names none.
+/// Mitsuba's default when a film has no filter.
 constexpr PixelFilter kDefaultFilter{PixelFilter::Kind::gaussian, 2.0f, 0.5f};
 
 constexpr std::array<std::string_view, 6> kFilters = {"box", "catmullrom", "gaussian", "lanczos", "mitchell", "tent"};
 
-/// As Mitsuba has them: it spans the Gaussian over four standard deviations to each side.
+/// Parameters as in Mitsuba, whose Gaussian extends four standard deviations to each side.
 PixelFilter makeFilter(const std::string& type, const Parameters& parameters) {
   const auto number = [&](const char* name, double fallback) {
     const double value = parameters.number(name, fallback);
@@ -87,8 +87,8 @@ FilmSize readSize(const Parameters& parameters, const Camera& camera) {
   return size;
 }
 
-/// What a film makes of the radiance that it has recorded is not applied: EXR files hold it as it is, PNG files in
-/// sRGB.
+/// Notes parameters of the film that tone-map or convert the picture. They are not applied: EXR files hold linear
+/// radiance, PNG files are sRGB-encoded.
 void noteDevelopment(ReadContext& context, pugi::xml_node node, Parameters& parameters) {
   constexpr std::array<const char*, 6> kNames = {"burn", "exposure", "gamma", "key", "pixel_format", "tonemap_method"};
   for (const char* name : kNames) {
@@ -116,8 +116,8 @@ void readFilm(ReadContext& context, pugi::xml_node node) {
 }
 
 void noteSampler(ReadContext& context, pugi::xml_node node) {
-  context.note(fmt::format("sampler \"{}\" is replaced by ours; samples are set on the command line",
-                           node.attribute("type").value()));
+  context.note(
+      fmt::format("sampler \"{}\" is ignored: loberender uses its own, see --spp", node.attribute("type").value()));
 }
 
 /// "50mm" on a 36 mm × 24 mm film, as the angle over its diagonal.
@@ -157,14 +157,14 @@ void readLens(const Parameters& parameters, Camera& camera) {
   if (!(camera.apertureRadius >= 0.0f))
     throw ParameterError("aperture_radius",
                          fmt::format("aperture_radius must not be negative, not {}", camera.apertureRadius));
-  constexpr double kFar = 1e4;  // Mitsuba's far_clip is where it focuses unless told otherwise
+  constexpr double kFar = 1e4;  // Mitsuba's default focus distance is far_clip
   camera.focusDistance = static_cast<float>(parameters.number("focus_distance", parameters.number("far_clip", kFar)));
   if (!(camera.focusDistance > 0.0f))
     throw ParameterError("focus_distance",
                          fmt::format("focus_distance must be positive, not {}", camera.focusDistance));
 }
 
-/// Distances along the viewing axis; planes that the file does not mention are not there.
+/// Distances along the viewing axis; a plane that the file does not give does not clip.
 void readClipPlanes(const Parameters& parameters, Camera& camera) {
   camera.nearClip = static_cast<float>(parameters.number("near_clip", 0));
   camera.farClip = parameters.has("far_clip") ? static_cast<float>(parameters.number("far_clip", 0)) : camera.farClip;
@@ -185,7 +185,7 @@ void readPerspective(const Parameters& parameters, Camera& camera) {
 /// In the order of Camera::Kind.
 constexpr std::array<std::string_view, 3> kCameras = {"perspective", "thinlens", "orthographic"};
 
-/// The camera on the film that has been read.
+/// Reads the camera; its film must have been read.
 Camera readCamera(ReadContext& context, pugi::xml_node node, const Parameters& parameters, Camera::Kind kind) {
   Camera camera = context.scene.camera;
   camera.kind = kind;
@@ -193,7 +193,7 @@ Camera readCamera(ReadContext& context, pugi::xml_node node, const Parameters& p
   if (kind != Camera::Kind::orthographic) readPerspective(parameters, camera);
   if (kind == Camera::Kind::thinlens) readLens(parameters, camera);
   readClipPlanes(parameters, camera);
-  // Only a lens has a plane in focus.
+  // Only a thin lens has a focal plane.
   if (kind != Camera::Kind::thinlens && parameters.has("focus_distance")) {
     parameters.number("focus_distance", 0);
     context.findings.noteWithoutEffect(describe(node), "focus_distance");
@@ -201,13 +201,13 @@ Camera readCamera(ReadContext& context, pugi::xml_node node, const Parameters& p
   return camera;
 }
 
-/// Integrators that show something else than the light that arrives.
-constexpr std::array<std::string_view, 6> kNotOfLight = {"albedo", "ao", "depth", "field", "motion", "normal"};
+/// Integrators that compute something other than radiance.
+constexpr std::array<std::string_view, 6> kNotRadiance = {"albedo", "ao", "depth", "field", "motion", "normal"};
 
-/// Those whose parameters are known.
+/// Integrators whose parameters are known.
 constexpr std::array<std::string_view, 5> kPathTracers = {"direct", "path", "volpath", "volpath_simple", "volpathmis"};
 
-/// How much light an integrator leaves out.
+/// The parameters of an integrator that restrict the light transport.
 struct LightTransport {
   std::optional<int> maxDepth;
   bool hideEmitters = false;
@@ -230,12 +230,12 @@ LightTransport readTransport(const std::string& type, const Parameters& paramete
   transport.hideEmitters = parameters.flag("hide_emitters", false);
   if (parameters.has("strict_normals") && !parameters.flag("strict_normals", true))
     parameters.warn("strict_normals",
-                    "strict normals are always on: directions on which the shading normal and the "
-                    "surface disagree carry no light");
+                    "strict normals are always on: directions on different sides of the surface and "
+                    "of the plane orthogonal to the shading normal carry no light");
   return transport;
 }
 
-/// Of those that others know, only what is known here; their other parameters are theirs alone.
+/// Parameters of unknown integrators are noted and erased, except those that are read here.
 void keepTransport(ReadContext& context, pugi::xml_node node, Parameters& parameters) {
   for (const std::string& name : parameters.unused()) {
     if (name == "max_depth" || name == "hide_emitters" || name == "strict_normals") continue;
@@ -244,18 +244,17 @@ void keepTransport(ReadContext& context, pugi::xml_node node, Parameters& parame
   }
 }
 
-/// Of the integrator or, for one that wraps another, of the inner one.
+/// The transport of the integrator or, if it contains another one, of the inner one.
 LightTransport readTransportOf(ReadContext& context, pugi::xml_node node) {
   const std::string type = node.attribute("type").value();
   std::optional<LightTransport> nested;
   const auto onChild = [&](pugi::xml_node child, const std::string&, Parameters&) {
     if (elementName(child) == "integrator") nested = readTransportOf(context, child);
-    return true;  // whatever else belongs to how it integrates
+    return true;  // other children only configure the integrator
   };
-  if (std::ranges::find(kNotOfLight, type) != kNotOfLight.end())
-    context.unsupported(node, "integrator " + type,
-                        fmt::format("integrator \"{}\" shows something else than light", type),
-                        "the light is rendered");
+  if (std::ranges::find(kNotRadiance, type) != kNotRadiance.end())
+    context.unsupported(node, "integrator " + type, fmt::format("integrator \"{}\" does not compute radiance", type),
+                        "radiance is rendered");
   Parameters parameters = readParameters(context, node, "integrator", onChild);
   if (std::ranges::find(kPathTracers, type) == kPathTracers.end()) keepTransport(context, node, parameters);
   const LightTransport own =
@@ -272,7 +271,7 @@ void readSensor(ReadContext& context, pugi::xml_node node) {
     context.unsupported(node, "sensor " + type,
                         fmt::format("unknown sensor type \"{}\"; {}", type,
                                     knownAre(type, fmt::format("{}", fmt::join(kCameras, ", ")))),
-                        "it is taken for perspective");
+                        "a perspective sensor is used");
   const auto kind =
       known == kCameras.end() ? Camera::Kind::perspective : static_cast<Camera::Kind>(known - kCameras.begin());
   context.scene.filter = kDefaultFilter;
@@ -299,10 +298,11 @@ void readIntegrator(ReadContext& context, pugi::xml_node node) {
     scene.emitterVisibility = context.file.isOfToday() ? EmitterVisibility::hidden : EmitterVisibility::dark;
   std::string kept;
   if (transport.maxDepth)
-    kept += fmt::format("; paths have at most {} segments, as there, unless the command line says otherwise",
+    kept += fmt::format("; its max_depth is kept: paths have up to {} segments unless --max-depth is given",
                         *transport.maxDepth);
-  if (transport.hideEmitters) kept += "; emitters are hidden, as there";
-  context.note(fmt::format("integrator \"{}\" is replaced by ours{}", node.attribute("type").value(), kept));
+  if (transport.hideEmitters) kept += "; its hide_emitters is kept";
+  context.note(fmt::format("integrator \"{}\" is ignored: loberender uses its own, see --integrator{}",
+                           node.attribute("type").value(), kept));
 }
 
 }  // namespace lobe

@@ -12,7 +12,8 @@ void readSensor(ReadContext& context, pugi::xml_node node);
 /// Sets the field of view from fov and fov_axis, or from focal_length. Throws ParameterError.
 void readFieldOfView(const Parameters& parameters, Camera& camera);
 
-/// Takes an integrator's max_depth (also that of an integrator inside) and notes that the rest is ours.
+/// Reads max_depth and hide_emitters of an integrator, or of the one nested in it, and notes that everything else is
+/// ignored.
 void readIntegrator(ReadContext& context, pugi::xml_node node);
 
 }  // namespace lobe

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <exception>
+#include <ranges>
 
 #include <fmt/format.h>
 
@@ -43,7 +44,7 @@ MeshOptions readOptions(const std::string& type, const Parameters& parameters) {
   options.maxSmoothAngle = readSmoothAngle(parameters);
   if (options.faceNormals && options.maxSmoothAngle)
     throw ParameterError("max_smooth_angle", "give either face_normals or max_smooth_angle");
-  // Mitsuba flips what an OBJ holds unless told otherwise, and the reader of OBJ files does so by itself.
+  // By default, Mitsuba flips the texture coordinates of an OBJ, and the reader of OBJ files always flips them.
   const bool usual = type == "obj";
   options.flipTexCoords = parameters.flag("flip_tex_coords", usual) != usual;
   return options;
@@ -83,7 +84,7 @@ Geometry makePrimitive(const std::string& type, const Parameters& parameters, co
 int readIndex(const Parameters& parameters, int fallback) {
   const double index = parameters.number("shape_index", fallback);
   if (!(index >= std::min(fallback, 0) && index <= 1e9) || index != std::floor(index))
-    throw ParameterError("shape_index", fmt::format("shape_index must be a whole number from 0, not {}", index));
+    throw ParameterError("shape_index", fmt::format("shape_index must be an integer from 0, not {}", index));
   return static_cast<int>(index);
 }
 
@@ -200,7 +201,7 @@ bool ShapeReader::take(pugi::xml_node child, const std::string& name, const std:
   return true;
 }
 
-/// The name of an OBJ's bsdf is that of the material it is for; "bsdf" is what Mitsuba 3 calls the only one.
+/// A named bsdf of an OBJ is for the material of that name; Mitsuba 3 uses the name "bsdf" for the only one.
 void ShapeReader::takeBsdf(pugi::xml_node child, const std::string& name, const std::string& type, Parts& parts) {
   if (type == "obj" && !name.empty() && name != "bsdf") {
     parts.named.emplace_back(name, child);
@@ -269,8 +270,8 @@ void ShapeReader::readMeshes() {
   });
   for (const Mesh& mesh : meshes_) reportFault(mesh);
   clearInstancesOutOfRange();
-  // From the back, as places are indices.
-  for (auto mesh = meshes_.rbegin(); mesh != meshes_.rend(); ++mesh) dropEmpty(*mesh);
+  // From the back, so that the indices of the remaining shapes stay valid.
+  for (const Mesh& mesh : std::views::reverse(meshes_)) dropEmpty(mesh);
   std::erase_if(context_.scene.shapes, [](const Shape& shape) {
     const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry);
     return mesh && mesh->triangles.empty();
@@ -293,7 +294,8 @@ void ShapeReader::reportFault(const Mesh& mesh) {
   context_.unsupported(mesh.location, message, message, "the shape is left out");
 }
 
-/// Leaves nothing of them but their places, which are indices that others know; readMeshes drops these at its end.
+/// Cleared instances remain in the list of shapes, because others are referred to by index; readMeshes removes them at
+/// its end.
 void ShapeReader::clearInstancesOutOfRange() {
   for (const auto& [index, location] : instances_) {
     const auto& instance = std::get<Instance>(context_.scene.shapes[index].geometry);
@@ -314,7 +316,7 @@ void ShapeReader::dropEmpty(const Mesh& mesh) {
     const auto shape = shapes.begin() + static_cast<std::ptrdiff_t>(mesh.shapes[i].index);
     if (!std::get<TriangleMesh>(shape->geometry).triangles.empty()) continue;
     if (mesh.fault.empty() && i < mesh.source.obj.materials.size())
-      context_.note(fmt::format("{}: no face is of material \"{}\"", mesh.source.path.filename().string(),
+      context_.note(fmt::format("{}: no face has the material \"{}\"", mesh.source.path.filename().string(),
                                 mesh.source.obj.materials[i]));
     shapes.erase(shape);
   }

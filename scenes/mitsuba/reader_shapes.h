@@ -17,26 +17,26 @@ class ShapeReader {
 
   /// Adds the shape to the scene; its mesh is left for readMeshes. Throws SceneError.
   void add(pugi::xml_node node);
-  /// Reads the meshes of all shapes added, in parallel. SceneError: the fault of the first shape that has one.
+  /// Reads the meshes of all shapes added, in parallel. A mesh that cannot be read is reported as a fault and left out.
   void readMeshes();
 
  private:
   struct Parts {
     pugi::xml_node bsdf;
-    std::vector<std::pair<std::string, pugi::xml_node>> named;  ///< of an OBJ's materials
+    std::vector<std::pair<std::string, pugi::xml_node>> named;  ///< for the OBJ's material of this name
     std::optional<AreaEmitter> emitter;
   };
-  /// Where a shape is kept: at the top of the scene (group −1) or in a group.
+  /// Where a shape is stored: at the top level of the scene (group −1) or in a group.
   struct Place {
     int group;
     std::size_t index;
   };
   struct Mesh {
-    std::vector<Place> shapes;  ///< one for each of the source's materials, then that of the rest
+    std::vector<Place> shapes;  ///< one for each of the source's materials, then one for the remaining faces
     std::ptrdiff_t location;
     MeshSource source;
     MeshOptions options;
-    bool loadMaterials;  ///< of an OBJ, from the library that it names
+    bool loadMaterials;  ///< from the library that the OBJ names
     std::string fault;
   };
 
@@ -56,7 +56,7 @@ class ShapeReader {
   }
   void read(Mesh& mesh);
   void reportFault(const Mesh& mesh);
-  /// A fault where one shows its group too far away.
+  /// Reports a fault for each instance whose group is too far away, and clears the instance.
   void clearInstancesOutOfRange();
   void dropEmpty(const Mesh& mesh);
 
@@ -65,8 +65,9 @@ class ShapeReader {
   MaterialReader& materials_;
   ObjMaterialReader objMaterials_;
   std::vector<Mesh> meshes_;
-  std::vector<std::pair<std::size_t, std::ptrdiff_t>> instances_;  // index into the scene's shapes, place in the file
-  std::map<std::ptrdiff_t, int> groups_;                           // by place in the file
+  std::vector<std::pair<std::size_t, std::ptrdiff_t>>
+      instances_;                         // index into the scene's shapes, location in the file
+  std::map<std::ptrdiff_t, int> groups_;  // by location in the file
 };
 
 }  // namespace lobe

@@ -15,10 +15,10 @@
 namespace lobe {
 namespace {
 
-/// What takes the place of a texture that cannot be had.
-constexpr float kPlainGrey = 0.5f;
+/// Reflectance that replaces a texture that cannot be read.
+constexpr float kFallbackGrey = 0.5f;
 
-/// Mitsuba 0.6's four numbers, or Mitsuba 3's transform in the plane.
+/// The transform of texture coordinates: Mitsuba 0.6's four numbers, or Mitsuba 3's to_uv.
 UvMap readUvMap(const Parameters& parameters) {
   if (!parameters.has("to_uv")) {
     const auto number = [&](const char* name, double fallback) {
@@ -28,7 +28,7 @@ UvMap readUvMap(const Parameters& parameters) {
             Vec2(number("uoffset", 0), number("voffset", 0))};
   }
   const Eigen::Matrix4d m = parameters.transform("to_uv");
-  // A matrix of 9 numbers has its translation in the third column, where (u, v) has its 1.
+  // A matrix of 9 numbers has its translation in the third column, which is multiplied by the 1 of (u, v, 1).
   return {m.topLeftCorner<2, 2>().cast<float>(), (m.col(2) + m.col(3)).head<2>().cast<float>()};
 }
 
@@ -49,8 +49,8 @@ bool readNearest(const Parameters& parameters) {
   if (filter != "nearest" && filter != "bilinear" && !prefilters)
     throw ParameterError("filter_type",
                          fmt::format("unknown filter \"{}\"; known are nearest, bilinear, trilinear, ewa", filter));
-  // Samples average over a pixel what these average beforehand.
-  if (prefilters) parameters.note(fmt::format("filter_type {} is taken for bilinear", filter));
+  // The samples of a pixel average what these filters average in advance.
+  if (prefilters) parameters.note(fmt::format("filter_type {} is replaced by bilinear", filter));
   return filter == "nearest";
 }
 
@@ -66,7 +66,7 @@ BitmapOptions readBitmapOptions(const Parameters& parameters) {
   return options;
 }
 
-/// The image, or a grey one of the channel that is chosen. That of alpha has been read as such.
+/// The image, or a grey one of the selected channel. For alpha, the image has been read from the alpha channel.
 std::shared_ptr<const Image> chosenChannel(const std::string& channel, std::shared_ptr<const Image> image) {
   constexpr std::string_view kChannels = "rgb";
   if (channel.empty() || channel == "a") return image;
@@ -104,12 +104,12 @@ TexturePtr TextureReader::read(pugi::xml_node node, Encoded encoded) {
       const Nesting nesting(context_, node, depth_);
       done.texture = makeOf(node, encoded);
     };
-    if (!context_.attempt("grey is used", make)) done.texture = constantTexture(grey(kPlainGrey));
+    if (!context_.attempt("grey is used", make)) done.texture = constantTexture(grey(kFallbackGrey));
     done.parts = std::exchange(parts_, outer);
   } else if (!done.texture) {
     context_.unsupported(node, fmt::format("circle at {}", SceneFile::location(node)),
                          "a texture that refers to itself", "grey is used in it");
-    return constantTexture(grey(kPlainGrey));
+    return constantTexture(grey(kFallbackGrey));
   }
   parts_ += done.parts;
   return done.texture;
@@ -138,14 +138,14 @@ TexturePtr TextureReader::makeOf(pugi::xml_node node, Encoded encoded) {
                          fmt::format("unknown texture type \"{}\"; {}", type,
                                      knownAre(type, "bitmap, checkerboard, scale, " + knownSpectra())),
                          "grey is used");
-    return constantTexture(grey(kPlainGrey));
+    return constantTexture(grey(kFallbackGrey));
   }
   Parameters parameters = readParameters(
       context_, node, "texture",
       [&](pugi::xml_node child, const std::string& name, Parameters& p) { return take(child, name, p, encoded); });
-  // Their means and bounds are found by looking at all of them.
+  // Computing means and bounds visits all of them.
   if (parts_ > kMostParts)
-    context_.file.fail(node, fmt::format("{}: more than {} textures nested in one", describe(node), kMostParts));
+    context_.file.fail(node, fmt::format("{}: more than {} nested textures", describe(node), kMostParts));
   if (type == "bitmap" && encoded == Encoded::linear) parameters.set("raw", true, parameters.location("raw"));
   return makeFrom(context_, node, parameters, [&](const Parameters& p) {
     if (isSpectrum(type)) return makeSpectrum(context_, node, type, p);
@@ -158,7 +158,7 @@ TexturePtr TextureReader::makeFromBitmap(pugi::xml_node node, const Parameters& 
   const BitmapOptions options = readBitmapOptions(parameters);
   const ImageRequest request = bitmapRequest(context_, parameters);
   std::shared_ptr<const Image> image = images_.get(context_, node, parameters, request, "grey is used");
-  if (!image) return constantTexture(grey(kPlainGrey));
+  if (!image) return constantTexture(grey(kFallbackGrey));
   const Sign sign = encoded == Encoded::asGiven ? Sign::positive : Sign::any;
   image = withoutFaults(context_, node, request, std::move(image), sign);
   return makeBitmap(chosenChannel(channelOf(parameters), std::move(image)), options);

@@ -8,8 +8,8 @@
 
 namespace lobe {
 
-/// Whether a texture's images are encoded as they or the file say, and hold colours or any numbers, or are plain
-/// numbers of either sign whatever is said.
+/// How the values of a texture's images are interpreted: with the encoding that the scene or the image states, as
+/// colours (asGiven) or as values of either sign (asGivenSigned), or as linear values of either sign (linear).
 enum class Encoded { asGiven, asGivenSigned, linear };
 
 class TextureReader {
@@ -18,25 +18,25 @@ class TextureReader {
 
   /// bitmap, checkerboard, scale or a spectrum; each element is read once for each encoding. Throws SceneError.
   TexturePtr read(pugi::xml_node node, Encoded encoded = Encoded::asGiven);
-  /// The image in the file, repeated over all texture coordinates, for what names it other than by a texture element.
-  /// The node is that of which messages speak, the location where it names the file.
+  /// A texture that repeats the image in the file, for images that are not given by a texture element. node: the
+  /// element that messages name. location: where the file is named.
   TexturePtr readFile(pugi::xml_node node, std::ptrdiff_t location, const std::filesystem::path& path, Encoded encoded);
   ImageStore& images() { return images_; }
 
-  /// Sets the parameter if the child is a texture, as a ChildHandler does.
+  /// Sets the parameter if the child is a texture. Has the return value of a ChildHandler.
   bool take(pugi::xml_node child, const std::string& name, Parameters& parameters, Encoded encoded = Encoded::asGiven);
 
  private:
   struct Made {
     TexturePtr texture;  ///< null while being read
-    int parts = 1;       ///< this texture and, as often as they are asked, those nested in it
+    int parts = 1;       ///< this texture and those nested in it, counted as often as they are evaluated
   };
   TexturePtr makeOf(pugi::xml_node node, Encoded encoded);
   TexturePtr makeFromBitmap(pugi::xml_node node, const Parameters& parameters, Encoded encoded);
 
   ReadContext& context_;
   ImageStore images_;
-  std::map<std::pair<std::ptrdiff_t, Encoded>, Made> done_;  // by place
+  std::map<std::pair<std::ptrdiff_t, Encoded>, Made> done_;  // by location
   int parts_ = 0;                                            // read so far for the element that is being read
   int depth_ = 0;                                            // of the texture being read
 };

@@ -1,5 +1,5 @@
 #pragma once
-// Internal to scenes/: the value of an element as what it should be.
+// Internal to scenes/: reads the value of an element as a given type.
 
 #include <optional>
 #include <string>
@@ -11,7 +11,8 @@
 
 namespace lobe {
 
-/// The value attribute. Throws SceneError where there is none, or another attribute than name and intent.
+/// The value attribute. Throws SceneError when it is missing, or when there is an attribute other than name, value and
+/// intent.
 inline std::string valueText(const ReadContext& context, pugi::xml_node node) {
   checkAttributes(context, node, {"name", "value", "intent"});
   const pugi::xml_attribute value = node.attribute("value");
@@ -19,7 +20,7 @@ inline std::string valueText(const ReadContext& context, pugi::xml_node node) {
   return value.value();
 }
 
-/// The same as parse() understands it. Throws SceneError that says what is wanted where that gives nullopt.
+/// The value attribute converted by parse(). When that returns nullopt, throws SceneError that says what is wanted.
 template <typename T>
 T parsedValue(const ReadContext& context, pugi::xml_node node, std::optional<T> (*parse)(std::string_view),
               std::string_view wanted) {

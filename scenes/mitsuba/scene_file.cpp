@@ -15,14 +15,14 @@
 namespace lobe {
 namespace {
 
-// Definitions that use each other, and files that include each other, can multiply a small file without end.
+// Limits on expansion: definitions that use each other, and files that include each other, can grow exponentially.
 constexpr std::size_t kLongestValue = 1 << 20, kMostIncludes = 1000, kLongestText = std::size_t{1} << 28;
 
 bool isNameCharacter(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) || c == '_';
 }
 
-/// From behind the '<' of an element's start tag to behind its '>'.
+/// Offset after the '>' of the start tag whose content begins at `begin`, after its '<'.
 std::size_t endOfTag(std::string_view text, std::size_t begin) {
   char quote = 0;
   for (std::size_t i = begin; i < text.size(); ++i) {
@@ -36,14 +36,14 @@ std::size_t endOfTag(std::string_view text, std::size_t begin) {
   return text.size();
 }
 
-/// What is between the tags of a well-formed file's <scene>.
+/// The text between the tags of a well-formed file's <scene>.
 TextRange bodyOfScene(std::string_view text, std::size_t root) {
   const std::size_t begin = endOfTag(text, root);
   if (text[begin - 2] == '/') return {begin, begin};
   return {begin, text.rfind("</scene")};
 }
 
-/// The first fault of the XML by itself; result stays empty without any.
+/// The first error in the XML; an empty message if there is none.
 struct ParseFault {
   std::size_t offset = 0;
   std::string message;
@@ -58,7 +58,7 @@ pugi::xml_node sceneIn(const pugi::xml_document& document, const pugi::xml_parse
   for (const pugi::xml_node node : document.children()) {
     if (scene || std::string_view(node.name()) != "scene") {
       fault = {static_cast<std::size_t>(SceneFile::location(node)),
-               fmt::format("<{}> where one <scene> is needed", node.name())};
+               fmt::format("<{}> at the top level, where only one <scene> is allowed", node.name())};
       return {};
     }
     scene = node;
@@ -71,7 +71,7 @@ bool equalButForCase(std::string_view a, std::string_view b) {
   return std::ranges::equal(a, b, [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
 }
 
-/// The only entry of the folder whose name differs by case at most.
+/// The only entry of the folder whose name differs at most in case.
 std::optional<std::filesystem::path> entryOfSimilarName(const std::filesystem::path& folder, const std::string& name) {
   std::optional<std::filesystem::path> found;
   std::error_code error;
@@ -84,8 +84,8 @@ std::optional<std::filesystem::path> entryOfSimilarName(const std::filesystem::p
   return found;
 }
 
-/// What the name may mean on a system that tells neither cases nor '/' and '\\' apart, such as the one that many scenes
-/// are made on; nothing unless exactly one file fits.
+/// The file that the name matches when case and the difference between '/' and '\\' are ignored, as on Windows; nullopt
+/// unless there is exactly one.
 std::optional<std::filesystem::path> fileOfSimilarName(std::filesystem::path folder, std::string name) {
   std::ranges::replace(name, '\\', '/');
   for (const std::filesystem::path& part : std::filesystem::path(name)) {
@@ -130,7 +130,7 @@ void SceneFile::parse() {
   checkDepth();
 }
 
-/// Everything after this goes down the tree by recursion.
+/// Limits the depth, because everything that follows traverses the tree recursively.
 void SceneFile::checkDepth() const {
   constexpr int kDeepest = 1000;
   int depth = 0;
@@ -175,7 +175,8 @@ void SceneFile::readFolders() {
   }
 }
 
-/// Puts the file of the first <include> in its place, or takes it out when that fails. Returns whether there was one.
+/// Replaces the first <include> by the content of its file, or removes it when that fails. Returns whether there was
+/// one.
 bool SceneFile::expandInclude() {
   const pugi::xml_node include = scene_.child("include");
   if (!include) return false;
@@ -186,11 +187,11 @@ bool SceneFile::expandInclude() {
   try {
     const std::size_t file = addFile(include);
     if (text_.size() + files_[file].text.size() > kLongestText)
-      fail(include, fmt::format("the file with all that it includes is longer than {} bytes", kLongestText));
+      fail(include, fmt::format("the file with all included files is longer than {} bytes", kLongestText));
     splice(begin, end, {file, bodyOf(file)});
   } catch (const SceneError& error) {
     for (const Fault& fault : error.faults())
-      findings_.fault(fault.where, fault.message, fault.message, "what is included there is left out");
+      findings_.fault(fault.where, fault.message, fault.message, "the included file is left out");
     splice(begin, end, {around, {0, 0}});
   }
   return true;
@@ -213,7 +214,7 @@ std::size_t SceneFile::addFile(pugi::xml_node include) {
   return files_.size() - 1;
 }
 
-/// Where in the file's text the content of its <scene> is.
+/// The range of the content of the file's <scene> in its text.
 TextRange SceneFile::bodyOf(std::size_t file) const {
   const std::string& text = files_[file].text;
   pugi::xml_document document;
@@ -224,7 +225,7 @@ TextRange SceneFile::bodyOf(std::size_t file) const {
   return bodyOfScene(text, static_cast<std::size_t>(location(scene)));
 }
 
-/// Replaces what is from begin to before end, all of one segment, by a part of a file.
+/// Replaces the range [begin, end), which must be in one segment, by a part of a file.
 void SceneFile::splice(std::size_t begin, std::size_t end, const Part& part) {
   const std::size_t length = part.range.end - part.range.begin;
   const Segment around = segmentAt(begin);
@@ -281,7 +282,7 @@ std::string SceneFile::substituted(const std::string& text, pugi::xml_node node)
 void SceneFile::checkDefinitionsUsed(const std::map<std::string, std::string>& definitions) const {
   for (const auto& [name, value] : definitions)
     if (!usedNames_.contains(name))
-      fail(scene_, fmt::format("the scene does not use ${}, which -D defines; it uses {}", name,
+      fail(scene_, fmt::format("-D defines ${}, which the scene does not use; it uses {}", name,
                                usedNames_.empty() ? "none" : fmt::format("{}", fmt::join(usedNames_, ", "))));
 }
 
@@ -303,8 +304,9 @@ void SceneFile::indexIds(pugi::xml_node node) {
     if (!id.empty() && name != "ref" && name != "alias") {
       const auto [it, isNew] = ids_.emplace(id, child);
       if (!isNew)
-        fault(child, fmt::format("the id \"{}\" is taken by the <{}> at {}", id, it->second.name(), where(it->second)),
-              "the first one has it");
+        fault(child,
+              fmt::format("the id \"{}\" is already used by the <{}> at {}", id, it->second.name(), where(it->second)),
+              "the first element keeps it");
     }
     indexIds(child);
   }
@@ -315,11 +317,11 @@ void SceneFile::indexAliases() {
     const std::string id = node.attribute("id").value(), as = node.attribute("as").value();
     const std::string consequence = "the alias is ignored";
     if (id.empty() || as.empty())
-      fault(node, "<alias> needs an id and an as", consequence);
+      fault(node, "<alias> needs the attributes id and as", consequence);
     else if (!byId(id))
-      fault(node, fmt::format("nothing has the id \"{}\"", id), consequence);
+      fault(node, fmt::format("there is no element with the id \"{}\"", id), consequence);
     else if (!ids_.emplace(as, byId(id)).second)
-      fault(node, fmt::format("the id \"{}\" is taken", as), consequence);
+      fault(node, fmt::format("the id \"{}\" is already used", as), consequence);
   }
 }
 
@@ -332,7 +334,7 @@ std::filesystem::path SceneFile::resolve(const std::string& name, std::ptrdiff_t
     const std::optional<std::filesystem::path> similar = fileOfSimilarName(folder, name);
     if (!similar) continue;
     const std::string message =
-        fmt::format("there is no {}; {} is taken for it", (folder / name).string(), similar->string());
+        fmt::format("{} does not exist: {} is used instead", (folder / name).string(), similar->string());
     findings_.warn(where(location), message, message);
     return *similar;
   }

@@ -1,7 +1,9 @@
 #pragma once
-// A scene file as a tree of elements with places: included files put in, parsed, $names substituted, ids indexed.
+// A scene file as a tree of elements with locations: included files are inserted, the text is parsed, $names are
+// substituted, and ids are indexed.
 //
-// All files are one text to the parser. A location is an offset in that text; where() knows the file it came from.
+// The parser sees all files as one text. A location is an offset in that text; where() converts it to a place in a
+// file.
 
 #include <cstddef>
 #include <filesystem>
@@ -17,36 +19,38 @@
 
 namespace lobe {
 
-/// Of characters in a text: from begin to before end.
+/// The characters [begin, end) of a text.
 struct TextRange {
   std::size_t begin, end;
 };
 
 class SceneFile {
  public:
-  /// Reads and parses the file, puts what is in the <scene> of other files where it says <include>, and replaces every
-  /// $name by the definition's value, else by that of the first <default> of this name. Faults go to findings, which
-  /// must outlive it: an undefined $name, an id given twice, a file that cannot be included. Throws SceneError where
-  /// nothing can be read: no such file, broken XML, elements nested too deeply; and for a definition that nothing uses.
+  /// Reads and parses the file, replaces every <include> by the content of the <scene> in that file, and replaces every
+  /// $name by its definition or, without one, by the first <default> of this name. Adds faults to findings, which must
+  /// outlive this object: an undefined $name, a duplicate id, a file that cannot be included. Throws SceneError when
+  /// nothing can be read (no such file, malformed XML, elements nested too deeply), and for a definition that is not
+  /// used.
   SceneFile(const std::filesystem::path& path, const std::map<std::string, std::string>& definitions,
             Findings& findings);
 
   pugi::xml_node scene() const { return scene_; }
 
-  /// Written for Mitsuba 3 (or 2), by the scene's version; some defaults differ. Without a version it is an older one.
+  /// Whether the scene's version says that it is written for Mitsuba 2 or 3, which have some different defaults. A
+  /// scene without a version is an older one.
   bool isOfToday() const { return majorVersion() >= 2; }
   /// The number before the first dot of the scene's version; 0 without one.
   int majorVersion() const;
 
-  /// Whether an attribute of the element still has a $name, which is a fault that has been found already.
+  /// Whether an attribute of the element still contains a $name, which has been reported as a fault already.
   static bool hasUndefinedName(pugi::xml_node node);
 
   /// The element with this id, or with the one that the id is an <alias> of; null when there is none.
   pugi::xml_node byId(const std::string& id) const;
 
-  /// A file that the scene names at that place: in a folder that a <path> gives, the latest first, or else relative to
-  /// the scene's own folder, wherever included files are. Where there is none, but exactly one whose name differs by
-  /// case or by '\\' for '/' only, it is that one, with a warning.
+  /// Path of a file that the scene names at that location: in one of the folders given by <path> (the last one first),
+  /// else relative to the scene's own folder, also for names in included files. If it does not exist, but exactly one
+  /// file differs from it only in case or in '\\' for '/', that file is used with a warning.
   std::filesystem::path resolve(const std::string& name, std::ptrdiff_t location) const;
 
   /// "FILE:LINE:COLUMN" of the element's '<'; columns count characters from one.
@@ -54,7 +58,7 @@ class SceneFile {
   std::string where(std::ptrdiff_t location) const;
   static std::ptrdiff_t location(pugi::xml_node node);
 
-  /// Throws SceneError at that place.
+  /// Throws SceneError at that location.
   [[noreturn]] void fail(pugi::xml_node node, std::string_view message) const { fail(location(node), message); }
   [[noreturn]] void fail(std::ptrdiff_t location, std::string_view message) const;
 
@@ -62,10 +66,10 @@ class SceneFile {
   struct File {
     std::filesystem::path path;
     std::string text;
-    std::size_t parent;              // the file that includes it; of the first, itself
-    std::vector<std::size_t> lines;  // where they begin in the text
+    std::size_t parent;              // the file that includes it; the first file is its own parent
+    std::vector<std::size_t> lines;  // offsets at which they begin in the text
   };
-  /// From begin on, to where the next segment begins, the text is that of a file from offset on.
+  /// The text from begin to the next segment comes from a file, starting at offset.
   struct Segment {
     std::size_t begin, file, offset;
   };
@@ -95,7 +99,7 @@ class SceneFile {
   Findings& findings_;
   std::vector<File> files_;
   std::string text_;
-  std::vector<Segment> segments_;  // in order, the first at 0
+  std::vector<Segment> segments_;  // in order; the first begins at 0
   std::vector<std::filesystem::path> folders_;
   pugi::xml_document document_;
   pugi::xml_node scene_;

@@ -11,7 +11,7 @@
 namespace lobe {
 namespace {
 
-constexpr double kStep = 1;  // of sums over wavelengths, nm
+constexpr double kStep = 1;  // of integrals over wavelengths, nm
 
 template <class Spectrum>
 Eigen::Vector3d integrate(const Spectrum& spectrum) {
@@ -21,7 +21,7 @@ Eigen::Vector3d integrate(const Spectrum& spectrum) {
   return sum;
 }
 
-/// By the luminance that equal energy has.
+/// Normalised by the luminance of the equal-energy spectrum.
 template <class Spectrum>
 Rgb rgbOfEmission(const Spectrum& spectrum) {
   static const double kEqualEnergy = integrate([](double) { return 1.0; }).y();
@@ -42,7 +42,7 @@ double valueAt(const SpectrumPoints& points, double nm) {
   return std::lerp(y0, after->second, (nm - x0) / (after->first - x0));
 }
 
-/// Of wavelengths and values in turn.
+/// From alternating wavelengths and values.
 std::optional<SpectrumPoints> pairsOf(const std::vector<double>& numbers) {
   std::vector<double> wavelengths, values;
   for (std::size_t i = 0; i < numbers.size(); ++i) (i % 2 == 0 ? wavelengths : values).push_back(numbers[i]);
@@ -84,7 +84,7 @@ Rgb rgbOfSpectrum(const SpectrumPoints& points, Illuminant illuminant) {
   const auto value = [&](double nm) { return valueAt(points, nm); };
   if (illuminant == Illuminant::equalEnergy) return rgbOfEmission(value);
   const Rgb colour = rgbOfReflectance(value);
-  // A saturated spectrum that reflects nowhere more than it receives may have components over 1.
+  // A saturated spectrum with values of at most 1 may have colour components over 1.
   const bool reflectsAtMostAll = std::ranges::all_of(points, [](const auto& point) { return point.second <= 1.0; });
   return reflectsAtMostAll ? colour.min(1.0f).eval() : colour;
 }

@@ -27,7 +27,7 @@ std::optional<Rgb> parseHexColour(std::string_view digits) {
          255.0f;
 }
 
-/// Levenshtein's: the fewest letters to insert, drop or exchange.
+/// Levenshtein distance: the fewest letters to insert, delete or replace.
 std::size_t editDistance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});
@@ -42,10 +42,10 @@ std::size_t editDistance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
-/// The nearest of the names; empty when none looks like what is wanted.
+/// The nearest of the names; empty when none is similar to the wanted one.
 std::string_view nearest(std::string_view wanted, std::string_view names) {
   std::string_view best;
-  std::size_t least = wanted.size() / 3 + 2;  // to be below
+  std::size_t least = wanted.size() / 3 + 2;  // exclusive upper bound
   while (!names.empty()) {
     const std::string_view name = names.substr(0, names.find(", "));
     names.remove_prefix(std::min(name.size() + 2, names.size()));
@@ -67,8 +67,8 @@ std::string knownAre(std::string_view wanted, std::string_view names) {
 std::string normalisedName(std::string_view name) {
   std::string result;
   for (std::size_t i = 0; i < name.size(); ++i) {
-    // A new word starts at a capital after a small letter or digit, and at the last capital of a run before a small
-    // one.
+    // A new word starts at an upper-case letter after a lower-case letter or digit, and at the last upper-case letter
+    // of a run that precedes a lower-case one.
     const bool afterWord = i > 0 && !isUpper(name[i - 1]) && name[i - 1] != '_';
     const bool endsRun = i > 0 && isUpper(name[i - 1]) && i + 1 < name.size() && isLower(name[i + 1]);
     if (isUpper(name[i]) && (afterWord || endsRun)) result += '_';

@@ -11,7 +11,7 @@
 namespace lobe {
 namespace {
 
-TEST_CASE("core: numbers are read whole or not at all") {
+TEST_CASE("core: numbers with trailing characters are rejected") {
   CHECK(parseReal("+1.5e3") == 1500.0);
   CHECK(parseReal("-.25") == -0.25);
   CHECK(!parseReal(""));
@@ -48,7 +48,7 @@ TEST_CASE("core: quantiles interpolate between the nearest values") {
   CHECK(std::isnan(median({})));
 }
 
-TEST_CASE("core: what is not a regular file is refused by name") {
+TEST_CASE("core: errors name what is not a regular file") {
   const auto message = [](const std::filesystem::path& path) -> std::string {
     try {
       nameErrors(path, [&] { return readFile(path); });

@@ -1,4 +1,4 @@
-// The fit that chooses records and components for itself.
+// Adaptive fitting of records and numbers of components.
 
 #include <tbb/global_control.h>
 #include <catch2/catch.hpp>
@@ -11,7 +11,7 @@ using namespace lobe;
 
 namespace {
 
-/// What a look-up for wo is worth.
+/// The quality of the mixture that a look-up for wo returns.
 Quality served(const Lobe& lobe, const DirectionGrid& grid, const FittedGrid& fit, const Vec3& wo) {
   std::array<Gaussian, kMaxCacheComponents> room;
   return gradeMixture(lobe, wo, fit.mixtureFor(grid, wo, room), 2048);
@@ -23,7 +23,7 @@ double meanComponents(const FittedGrid& fit) {
 
 }  // namespace
 
-TEST_CASE("fitter: directions between the records are served as well as asked for") {
+TEST_CASE("fitter: directions between the records reach the requested quality") {
   const FitSettings settings = defaultFitSettings();
   const double alpha = GENERATE(0.05, 0.3);
   const LobePtr lobe = conductorLobe(alpha, alpha);
@@ -37,7 +37,7 @@ TEST_CASE("fitter: directions between the records are served as well as asked fo
   }
 }
 
-TEST_CASE("fitter: less quality needs less") {
+TEST_CASE("fitter: a lower quality needs fewer components") {
   const LobePtr lobe = conductorLobe(0.2, 0.2);
   const DirectionGrid grid{GridKind::elevation, 64};
   FitSettings settings = defaultFitSettings();
@@ -47,7 +47,7 @@ TEST_CASE("fitter: less quality needs less") {
   CHECK(coarse.components.size() < fine.components.size() / 2);
 }
 
-TEST_CASE("fitter: by default records are as good as weighted EM with eight components") {
+TEST_CASE("fitter: with default settings records are as good as weighted EM with eight components") {
   FitSettings settings = defaultFitSettings(), wem = settings;
   settings.reduction = wem.reduction = 0;
   wem.method = FitMethod::wem;
@@ -58,7 +58,7 @@ TEST_CASE("fitter: by default records are as good as weighted EM with eight comp
     for (const double elevation : {10.0, 40.0, 65.0, 80.0}) {
       CAPTURE(distribution, alpha, elevation);
       const FittedRecord fewest = fitWithFewest(*lobe, direction(elevation), settings);
-      // More Gaussians have to be worth a quarter of that.
+      // More Gaussians are used only if they gain at least a quarter of the target.
       CHECK(fewest.worse() <= 1.25f * fitLobe(*lobe, direction(elevation), wem).worse());
       CHECK(fewest.worse() <= 1.25f * settings.quality);
       components += fewest.mixture.size(), ++records;
@@ -67,7 +67,7 @@ TEST_CASE("fitter: by default records are as good as weighted EM with eight comp
   CHECK(components <= 5 * records);
 }
 
-TEST_CASE("fitter: an anisotropic lobe is fitted for a quarter of the directions and served for all") {
+TEST_CASE("fitter: an anisotropic lobe is fitted for a quarter of the directions and looked up for all") {
   const LobePtr lobe = conductorLobe(0.1, 0.3);
   const DirectionGrid grid{GridKind::fibonacci, 512};
   FitSettings settings = defaultFitSettings();
@@ -78,7 +78,7 @@ TEST_CASE("fitter: an anisotropic lobe is fitted for a quarter of the directions
     const Vec3 w = grid.direction(static_cast<int>(record.entry));
     CHECK((w.x() >= 0 && w.y() >= 0));
   }
-  // The four directions that mirroring makes of one are alike.
+  // The four mirrored copies of a direction have similar quality.
   for (const double elevation : {20.0, 55.0, 75.0}) {
     for (const double azimuth : {30.0, 150.0, 210.0, 330.0}) {
       CAPTURE(elevation, azimuth);
@@ -87,7 +87,7 @@ TEST_CASE("fitter: an anisotropic lobe is fitted for a quarter of the directions
   }
 }
 
-TEST_CASE("fitter: a lobe that is next to a mirror is left to the BSDF") {
+TEST_CASE("fitter: a nearly specular lobe gets records without components") {
   const LobePtr lobe = conductorLobe(0.001, 0.001);
   const FittedGrid fit = fitAdaptively(*lobe, {GridKind::elevation, 64}, defaultFitSettings());
   CHECK(fit.components.empty());
@@ -99,7 +99,7 @@ TEST_CASE("fitter: a lobe that is next to a mirror is left to the BSDF") {
   for (const std::uint32_t record : fit.lookup) CHECK(record < fit.records.size());
 }
 
-TEST_CASE("fitter: what is chosen does not depend on the number of threads") {
+TEST_CASE("fitter: the adaptive fit does not depend on the number of threads") {
   const LobePtr lobe = conductorLobe(0.1, 0.1);
   std::vector<FittedGrid> fits;
   for (const std::size_t threads : {1u, 2u}) {

@@ -46,7 +46,7 @@ void runAll(const std::vector<CompileJob>& jobs) {
 
 }  // namespace
 
-TEST_CASE("fitter: equal lobes are fitted once, whatever the material") {
+TEST_CASE("fitter: equal lobes of different materials are fitted once") {
   const Scene scene = sceneOf({{"red", roughConductor(0.2, 0.2)},
                                {"rough", roughConductor(0.3, 0.3)},
                                {"blue", roughConductor(0.2, 0.2)},
@@ -58,7 +58,7 @@ TEST_CASE("fitter: equal lobes are fitted once, whatever the material") {
   CHECK(abbreviated(uses[0].materials) == "red + 1 more");
 }
 
-TEST_CASE("fitter: what is up to date is left alone, what is not says why") {
+TEST_CASE("fitter: caches that are up to date are kept and stale ones give a reason") {
   const Folder folder;
   const std::vector<LobeUse> uses =
       collectLobes(sceneOf({{"iso", roughConductor(0.3, 0.3)}, {"aniso", roughConductor(0.1, 0.3)}}));
@@ -74,17 +74,17 @@ TEST_CASE("fitter: what is up to date is left alone, what is not says why") {
   CHECK(!planCompile(uses, options)[0].upToDate);
   options.force = false;
   options.settings.components = 4;
-  CHECK(planCompile(uses, options)[0].stale == "other fit settings");
+  CHECK(planCompile(uses, options)[0].stale == "different fit settings");
   options = quickOptions(folder.path());
   options.elevations = 7;
   jobs = planCompile(uses, options);
-  CHECK(jobs[0].stale == "another grid of directions");
+  CHECK(jobs[0].stale == "different grid of directions");
   CHECK(jobs[1].upToDate);
   fs::resize_file(jobs[1].path, 100);
   CHECK_THAT(planCompile(uses, options)[1].stale, Catch::Contains("truncated"));
 }
 
-TEST_CASE("fitter: the same bytes from any number of threads") {
+TEST_CASE("fitter: cache files do not depend on the number of threads") {
   const Folder folder;
   const std::vector<LobeUse> uses =
       collectLobes(sceneOf({{"iso", roughConductor(0.3, 0.3)}, {"aniso", roughConductor(0.1, 0.3)}}));
@@ -101,7 +101,7 @@ TEST_CASE("fitter: the same bytes from any number of threads") {
   CHECK(contents[0][0].size() > 500);
 }
 
-TEST_CASE("fitter: the summary of a cache is that of its records") {
+TEST_CASE("fitter: the summary of a cache agrees with its records") {
   const Folder folder;
   LobeCacheInfo info;
   info.model = info.key = info.summary = info.toolVersion = "x";
@@ -124,7 +124,7 @@ TEST_CASE("fitter: the summary of a cache is that of its records") {
   CHECK(s.outside == Approx(0.2));
 }
 
-TEST_CASE("fitter: options out of range are named") {
+TEST_CASE("fitter: errors name the option that is out of range") {
   const auto fault = [](const std::function<void(CompileOptions&)>& change) {
     CompileOptions options;
     change(options);
@@ -160,7 +160,7 @@ const char* const kTwoMaterials = R"(<scene version="0.6.0">
 
 }  // namespace
 
-TEST_CASE("fitter: lobefit compiles a scene, then has nothing to do; lobedump shows what it made") {
+TEST_CASE("fitter: lobefit compiles a scene once and lobedump shows the caches") {
   const Folder folder;
   writeAtomically(folder / "scene.xml", std::string(kTwoMaterials));
   const std::string fit = "lobefit scene.xml -D roughness=0.3 --elevations 4 --samples 256";
@@ -183,7 +183,7 @@ TEST_CASE("fitter: lobefit compiles a scene, then has nothing to do; lobedump sh
   CHECK(nlohmann::json::parse(r.out)[0]["records"].size() == 4);
 }
 
-TEST_CASE("fitter: a lobe that fails leaves the others whole, not half fitted") {
+TEST_CASE("fitter: if one lobe fails the caches of the others are complete") {
   const Folder folder;
   std::string scene = "<scene version=\"3.0.0\">";
   for (int i = 0; i < 6; ++i)
@@ -196,7 +196,7 @@ TEST_CASE("fitter: a lobe that fails leaves the others whole, not half fitted") 
   std::vector<fs::path> names;
   for (const auto& entry : fs::directory_iterator(folder / "clean")) names.push_back(entry.path().filename());
   REQUIRE(names.size() == 6);
-  // A folder where one cache should be: its lobe fails while the others are being fitted.
+  // A folder takes the place of one cache file, so its lobe fails while the others are being fitted.
   for (const fs::path& obstacle : names) {
     fs::remove_all(folder / "b");
     fs::create_directories(folder / "b" / obstacle);
@@ -209,7 +209,7 @@ TEST_CASE("fitter: a lobe that fails leaves the others whole, not half fitted") 
   }
 }
 
-TEST_CASE("fitter: a fit that is cancelled from outside throws instead of returning a part") {
+TEST_CASE("fitter: a fit that is cancelled from outside throws instead of returning a partial result") {
   const BsdfPtr bsdf = roughConductor(0.3, 0.3);
   CompileOptions options;
   const CompileJob job = planCompile(collectLobes(sceneOf({{"a", bsdf}})), options).front();
@@ -219,7 +219,7 @@ TEST_CASE("fitter: a fit that is cancelled from outside throws instead of return
     bool returned = false;
     const auto fitBesideFailure = [&] {
       parallelFor(0, 1, [&](int) {
-        // The enclosing loop is cancelled at the first direction that is fitted.
+        // Cancel the enclosing loop at the first fitted direction.
         tbb::task_group_context* enclosing = tbb::task::current_context();
         fitGrid(*job.use.lobe, job.grid, settings, [enclosing] { enclosing->cancel_group_execution(); });
         returned = true;
@@ -230,7 +230,7 @@ TEST_CASE("fitter: a fit that is cancelled from outside throws instead of return
   }
 }
 
-TEST_CASE("fitter: tools refuse bad input with one line") {
+TEST_CASE("fitter: tools report invalid input in one line") {
   const Folder folder;
   writeAtomically(folder / "scene.xml", std::string(kTwoMaterials));
   writeAtomically(folder / "broken.xml", std::string("<scene><bsdf type='diffuse'></scene>"));
@@ -264,7 +264,7 @@ TEST_CASE("fitter: tools refuse bad input with one line") {
   CHECK(!fs::exists(folder / "lobes"));
 }
 
-TEST_CASE("fitter: tools end with the exit code that fits and say why in one line") {
+TEST_CASE("fitter: tools return the documented exit codes") {
   const auto run = [](std::vector<std::string> arguments, const std::function<void()>& work) {
     std::vector<char*> argv;
     argv.reserve(arguments.size());

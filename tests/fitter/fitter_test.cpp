@@ -15,7 +15,7 @@ using namespace lobe;
 
 namespace {
 
-/// Midpoints of a fine grid of squares over the disc: shares nothing with the fitter but the disc map. f: of y and wi.
+/// ∫ f(y, wi) dA over the disc by the midpoint rule on a square grid; independent of the fitter but for the disc map.
 template <class F>
 double discIntegral(int resolution, const F& f) {
   double sum = 0;
@@ -29,7 +29,7 @@ double discIntegral(int resolution, const F& f) {
   return sum * step * step;
 }
 
-/// A constant over the hemisphere, or over a small disc of the disc about (0.3, 0).
+/// A constant over the hemisphere, or over a small circle about (0.3, 0) on the disc.
 class TestLobe : public Lobe {
  public:
   explicit TestLobe(double value, bool samples = true, float radius = 1)
@@ -47,7 +47,7 @@ class TestLobe : public Lobe {
     return LobeSample{wi, pdf({}, wi)};
   }
   float pdf(const Vec3&, const Vec3& wi) const override {
-    // With room for the rounding of directions.
+    // The factor allows for rounding of directions.
     const bool inside = wi.z() > 0 && (toDisc(wi) - centre()).norm() < 1.1f * radius_;
     return inside ? 0.15915494f / (radius_ * radius_) : 0;
   }
@@ -61,7 +61,7 @@ class TestLobe : public Lobe {
 
 }  // namespace
 
-TEST_CASE("fitter: mass on the disc by quadrature in one dimension agrees with brute force") {
+TEST_CASE("fitter: mass on the disc by quadrature in one dimension agrees with quadrature in two") {
   const Gaussian cases[] = {{1, 0, 0, {0.01f, 0, 0.01f}},         {1, -0.7f, 0.2f, {0.02f, 0.005f, 0.03f}},
                             {1, 0.95f, 0, {0.01f, 0, 0.1f}},      {1, 0.6f, 0.6f, {0.3f, -0.2f, 0.4f}},
                             {1, -0.98f, 0.1f, {0.2f, 0, 0.002f}}, {1, 1.2f, 0.1f, {0.1f, 0.02f, 0.05f}}};
@@ -74,17 +74,17 @@ TEST_CASE("fitter: mass on the disc by quadrature in one dimension agrees with b
   }
 }
 
-TEST_CASE("fitter: mass on the disc adds up by weight and knows the closed forms") {
+TEST_CASE("fitter: mass on the disc is linear in the weight and agrees with closed forms") {
   const Gaussian narrow{0.25f, 0.3f, -0.4f, {1e-4f, 2e-5f, 3e-4f}};
   const DiscMass one = discMass(std::span(&narrow, 1));
   CHECK(one.inside == Approx(0.25).epsilon(1e-9));
   CHECK(one.cosine == Approx(0.25 * (1 - 0.09 - 0.16 - 4e-4)).epsilon(1e-6));  // E|y|² = |μ|² + tr Σ
-  // A round one at the centre: 1 − exp(−1/2σ²) of the mass is inside.
+  // For an isotropic Gaussian at the centre, the mass inside is 1 − exp(−1/2σ²).
   const Gaussian round{1, 0, 0, {0.25f, 0, 0.25f}};
   CHECK(discMass(std::span(&round, 1)).inside == Approx(1 - std::exp(-2.0)).epsilon(1e-9));
 }
 
-TEST_CASE("fitter: integral, albedo and cosine mass agree with quadrature over the disc") {
+TEST_CASE("fitter: integral and albedo and cosine mass agree with quadrature over the disc") {
   for (const double alpha : {0.15, 0.4}) {
     for (const double elevation : {5.0, 50.0, 80.0}) {
       const LobePtr lobe = conductorLobe(alpha, alpha);
@@ -105,12 +105,12 @@ TEST_CASE("fitter: integral, albedo and cosine mass agree with quadrature over t
   }
 }
 
-TEST_CASE("fitter: both NEVs are the relative variance by quadrature") {
+TEST_CASE("fitter: both estimates of the relative variance agree with quadrature") {
   for (const double elevation : {10.0, 60.0, 85.0}) {
     const LobePtr lobe = conductorLobe(0.3, 0.3);
     const Vec3 wo = direction(elevation);
     FitSettings settings;
-    settings.components = 2;  // a poor fit, so that there is something to measure
+    settings.components = 2;  // a poor fit, so that the relative variance is well above zero
     const FittedRecord fit = fitLobe(*lobe, wo, settings);
     const double mass =
         discIntegral(1000, [&](const Vec2& y, const Vec3& wi) { return mixturePdf(fit.mixture, y) * wi.z(); });
@@ -128,8 +128,8 @@ TEST_CASE("fitter: both NEVs are the relative variance by quadrature") {
   }
 }
 
-TEST_CASE("fitter: GGX fits are as good as weighted EM is known to be") {
-  // Medians over elevation, of ρ cosθ against the defensive density.
+TEST_CASE("fitter: weighted EM reaches the expected relative variance for GGX") {
+  // Medians over elevation of the relative variance of ρ cosθ with the defensive density.
   for (const auto& [alpha, bound] : {std::pair(0.1, 0.142), std::pair(0.3, 0.2)}) {
     const LobePtr lobe = conductorLobe(alpha, alpha);
     std::vector<float> nev;
@@ -145,7 +145,7 @@ TEST_CASE("fitter: GGX fits are as good as weighted EM is known to be") {
   }
 }
 
-TEST_CASE("fitter: the cosine is not in the fit") {
+TEST_CASE("fitter: mixtures are fitted without the cosine") {
   // A constant ρ is flat over the disc, so the mixture's mean cosine is that of the disc, ½; with the cosine in the fit
   // it would be ⅔.
   const FittedRecord fit = fitLobe(TestLobe(0.3), direction(20), {});
@@ -155,7 +155,7 @@ TEST_CASE("fitter: the cosine is not in the fit") {
   CHECK(fit.record.albedo == Approx(0.3 * std::numbers::pi).epsilon(1e-3));
 }
 
-TEST_CASE("fitter: fits are sound at every elevation and roughness") {
+TEST_CASE("fitter: fits are valid at every elevation and roughness") {
   FitSettings settings;
   settings.samples = 1024;
   for (const double alpha : {0.001, 0.01, 0.05, 0.2, 0.5, 1.0}) {
@@ -168,7 +168,7 @@ TEST_CASE("fitter: fits are sound at every elevation and roughness") {
   checkSound(fitLobe(*conductorLobe(0.02, 0.02, "beckmann"), direction(89.9), settings));
 }
 
-TEST_CASE("fitter: few samples and one component are enough for a record") {
+TEST_CASE("fitter: fits with few samples or one component are valid") {
   for (const std::uint32_t components : {1u, 8u, 32u}) {
     FitSettings settings;
     settings.components = components;
@@ -180,7 +180,7 @@ TEST_CASE("fitter: few samples and one component are enough for a record") {
   }
 }
 
-TEST_CASE("fitter: merging saves components") {
+TEST_CASE("fitter: merging reduces the number of components") {
   FitSettings all, some;
   all.reduction = 0;
   some.reduction = 0.2f;
@@ -189,7 +189,7 @@ TEST_CASE("fitter: merging saves components") {
   CHECK(fitLobe(*lobe, direction(40), some).mixture.size() < 7);
 }
 
-TEST_CASE("fitter: lobes without value are left to the BSDF") {
+TEST_CASE("fitter: lobes without reflectance get one record without components") {
   const DirectionGrid grid{GridKind::elevation, 4};
   for (const bool samples : {true, false})
     for (const FitSettings& settings : {FitSettings{}, defaultFitSettings()}) {
@@ -200,13 +200,13 @@ TEST_CASE("fitter: lobes without value are left to the BSDF") {
     }
 }
 
-TEST_CASE("fitter: lobes with values that are no numbers are refused in words") {
+TEST_CASE("fitter: errors say why a lobe cannot be fitted") {
   const DirectionGrid grid{GridKind::elevation, 4};
   CHECK_THROWS_WITH(fitGrid(TestLobe(std::nan("")), grid, {}), Catch::Contains("its value is nan"));
   CHECK_THROWS_WITH(fitGrid(TestLobe(1, true, 5e-6f), grid, {}), Catch::Contains("too sharp"));
 }
 
-TEST_CASE("fitter: look-up turns and moves mixtures to the query, and its sign is right") {
+TEST_CASE("fitter: look-up rotates and translates mixtures towards the query in the right direction") {
   const LobePtr lobe = conductorLobe(0.05, 0.05);
   const DirectionGrid grid{GridKind::elevation, 24};
   const FittedGrid fit = fitGrid(*lobe, grid, {});
@@ -233,7 +233,7 @@ TEST_CASE("fitter: look-up turns and moves mixtures to the query, and its sign i
   CHECK(unmoved < 0.7 * wrong);
 }
 
-TEST_CASE("fitter: look-up of an anisotropic grid moves without turning") {
+TEST_CASE("fitter: look-up in an anisotropic grid translates without rotating") {
   const DirectionGrid grid{GridKind::fibonacci, 200};
   const Gaussian g{1, -0.3f, 0.1f, {0.01f, 0.002f, 0.04f}};
   std::array<Gaussian, 1> out;
@@ -245,17 +245,17 @@ TEST_CASE("fitter: look-up of an anisotropic grid moves without turning") {
   CHECK((out[0].cov.xx == g.cov.xx && out[0].cov.xy == g.cov.xy && out[0].cov.yy == g.cov.yy));
 }
 
-TEST_CASE("fitter: look-up mirrors what a symmetric lobe has on the other side") {
+TEST_CASE("fitter: look-up mirrors the mixtures of symmetric lobes") {
   const Gaussian g{1, -0.3f, 0.1f, {0.01f, 0.002f, 0.04f}};
   std::array<Gaussian, 1> out;
   const Vec3 wo = direction(40, 20);
   const Alignment alignment{GridKind::fibonacci, Vec2(-toDisc(wo).x(), toDisc(wo).y()), {true, false}};
-  alignMixture(alignment, std::span(&g, 1), wo, out);  // exactly the mirrored direction: no step
+  alignMixture(alignment, std::span(&g, 1), wo, out);  // exactly the mirrored direction, so no translation
   CHECK((out[0].mean() - Vec2(0.3f, 0.1f)).norm() < 1e-6f);
   CHECK((out[0].cov.xx == g.cov.xx && out[0].cov.xy == -g.cov.xy && out[0].cov.yy == g.cov.yy));
 }
 
-TEST_CASE("fitter: look-up pushes no mean out of the disc") {
+TEST_CASE("fitter: look-up keeps means inside the disc") {
   const DirectionGrid grid{GridKind::elevation, 2};
   const std::array<Gaussian, 2> mixture{{{0.5f, -0.98f, 0.1f, {0.01f, 0, 0.01f}}, {0.5f, -0.2f, 0, {0.01f, 0, 0.01f}}}};
   std::array<Gaussian, 2> out;
@@ -267,7 +267,7 @@ TEST_CASE("fitter: look-up pushes no mean out of the disc") {
   }
 }
 
-TEST_CASE("fitter: look-up moves a lobe whatever holds up its tail at the edge") {
+TEST_CASE("fitter: look-up translates a lobe even if a wide component lies at the edge") {
   const std::array<Gaussian, 2> mixture{{{0.1f, -0.1f, 0.994f, {1, 0, 3}}, {0.9f, -0.2f, 0, {0.01f, 0, 0.01f}}}};
   std::array<Gaussian, 2> out;
   const Vec3 from = direction(20, 5), to = direction(22, -10);

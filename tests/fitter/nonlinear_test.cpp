@@ -14,8 +14,8 @@ using namespace lobe;
 
 namespace {
 
-/// A mixture over the disc as a lobe. Its sampler is the mixture, or uniform over the hemisphere; its values may be
-/// noisy, by a factor from 0 to 2 that changes with every direction, or all zero.
+/// A lobe whose values are a mixture over the disc. Its sampler is the mixture or uniform over the hemisphere; its
+/// values may be multiplied by noise between 0 and 2, or all be zero.
 class MixtureLobe : public Lobe {
  public:
   enum class Values { exact, noisy, black };
@@ -75,7 +75,7 @@ double squares(const FitResiduals& residuals, const Eigen::VectorXd& parameters)
   return values.squaredNorm();
 }
 
-/// Largest difference of the Jacobian from central differences, relative to its largest entry.
+/// Largest difference between the Jacobian and central differences, relative to the largest entry.
 double jacobianError(const FitResiduals& residuals, const Eigen::VectorXd& parameters) {
   Eigen::MatrixXd jacobian(residuals.NumResiduals(), residuals.NumParameters());
   Eigen::VectorXd values(residuals.NumResiduals()), above = values, below = values;
@@ -106,7 +106,7 @@ MassSlopes slopesOf(const Gaussian& g) {
 
 }  // namespace
 
-TEST_CASE("fitter: slopes of the mass on the disc agree with differences") {
+TEST_CASE("fitter: derivatives of the mass on the disc agree with finite differences") {
   const Gaussian cases[] = {{1, 0.1f, 0, {0.004f, 0, 0.004f}},
                             {1, 0.95f, 0, {0.01f, 0, 0.1f}},
                             {1, 0.6f, 0.6f, {0.3f, -0.2f, 0.4f}},
@@ -133,7 +133,7 @@ TEST_CASE("fitter: slopes of the mass on the disc agree with differences") {
   }
 }
 
-TEST_CASE("fitter: derivatives of the residuals agree with differences") {
+TEST_CASE("fitter: derivatives of the residuals agree with finite differences") {
   for (const double elevation : {20.0, 70.0, 89.0}) {
     for (const FitObjective objective : {FitObjective::product, FitObjective::reflectance}) {
       const LobePtr lobe = conductorLobe(0.1, 0.3);
@@ -149,7 +149,7 @@ TEST_CASE("fitter: derivatives of the residuals agree with differences") {
   }
 }
 
-TEST_CASE("fitter: parameters go to a mixture and back") {
+TEST_CASE("fitter: a mixture survives conversion to parameters and back") {
   Whitening whitening;
   whitening.centre = {-0.4, 0.1};
   whitening.factor << 0.3, 0, 0.05, 0.2;
@@ -166,7 +166,7 @@ TEST_CASE("fitter: parameters go to a mixture and back") {
   }
 }
 
-TEST_CASE("fitter: a lobe that is a mixture is found again") {
+TEST_CASE("fitter: least squares recovers a lobe that is a mixture") {
   const MixtureLobe lobe(kTwoLobes);
   Mixture start = kTwoLobes;
   start[0].meanX += 0.1f, start[0].weight = 0.5f, start[1].cov.xx *= 3, start[1].meanY += 0.05f;
@@ -176,14 +176,14 @@ TEST_CASE("fitter: a lobe that is a mixture is found again") {
     const NonlinearFit fit = refineMixture(lobe, direction(30), start, options);
     CAPTURE(static_cast<int>(objective));
     CHECK(fit.startCost > 0.1);
-    CHECK(fit.cost < 0.01);  // not 0: a tenth of the density has no cosine
+    CHECK(fit.cost < 0.01);  // not 0: the BSDF part of the density (a tenth) has no cosine
     CHECK(fit.mixture[0].weight == Approx(0.3).margin(0.01));
     CHECK((fit.mixture[0].mean() - kTwoLobes[0].mean()).norm() < 0.01f);
     CHECK(fit.mixture[1].cov.xx == Approx(0.003).margin(2e-4));
   }
 }
 
-TEST_CASE("fitter: Eq. 8 is in one measure, as its printed form is not") {
+TEST_CASE("fitter: Eq. 8 is evaluated in one measure unlike its printed form") {
   const LobePtr lobe = conductorLobe(0.2, 0.2);
   const Vec3 wo = direction(40);
   NonlinearFitOptions options;
@@ -191,7 +191,7 @@ TEST_CASE("fitter: Eq. 8 is in one measure, as its printed form is not") {
   const Mixture start = fitLobe(*lobe, wo, settingsFor(FitMethod::wem)).mixture;
   const Mixture fit = refineMixture(*lobe, wo, start, options).mixture;
   FitPoints points = fitPoints(*lobe, wo, fit, options);
-  // Σ (1 − r/s)² over the sum s of unnormalised weights has its optimum at s = Σ r² / Σ r.
+  // Σ (1 − r/s)², where s is the sum of unnormalised weights, is minimal at s = Σ r² / Σ r.
   const auto bestSum = [&] {
     double first = 0, second = 0;
     for (Eigen::Index i = 0; i < points.size(); ++i) {
@@ -211,7 +211,7 @@ TEST_CASE("fitter: Eq. 8 is in one measure, as its printed form is not") {
   CHECK(squares(residuals, parameters) > 0.2);
 }
 
-TEST_CASE("fitter: the product's χ² is the NEV that grades it") {
+TEST_CASE("fitter: the objective of the product is the relative variance of the grade") {
   const LobePtr lobe = conductorLobe(0.2, 0.2);
   const Vec3 wo = direction(60);
   const Mixture start = fitLobe(*lobe, wo, settingsFor(FitMethod::wem, 2)).mixture;
@@ -221,7 +221,7 @@ TEST_CASE("fitter: the product's χ² is the NEV that grades it") {
   CHECK(fit.cost < 0.7 * fit.startCost);
 }
 
-TEST_CASE("fitter: least squares are better than weighted EM everywhere, and good") {
+TEST_CASE("fitter: least squares improves on weighted EM at every elevation") {
   for (const auto& [alphaU, alphaV, distribution] :
        {std::tuple(0.02, 0.02, "ggx"), std::tuple(0.1, 0.1, "ggx"), std::tuple(0.5, 0.5, "ggx"),
         std::tuple(0.05, 0.05, "beckmann"), std::tuple(0.05, 0.2, "ggx")}) {
@@ -238,7 +238,7 @@ TEST_CASE("fitter: least squares are better than weighted EM everywhere, and goo
   }
 }
 
-TEST_CASE("fitter: least squares are sound at every elevation and roughness") {
+TEST_CASE("fitter: least squares fits are valid at every elevation and roughness") {
   for (const FitMethod method : {FitMethod::ceres, FitMethod::eq8}) {
     for (const double alpha : {0.001, 0.05, 1.0}) {
       for (const double elevation : {0.0, 20.0, 89.0, 89.99}) {
@@ -251,7 +251,7 @@ TEST_CASE("fitter: least squares are sound at every elevation and roughness") {
   }
 }
 
-TEST_CASE("fitter: least squares are sound for few samples and components and for odd lobes") {
+TEST_CASE("fitter: least squares fits are valid for few samples or components and for unusual lobes") {
   const Vec3 wo = direction(60);
   const Vec2 back = toDisc(wo);
   const Mixture retro{{1, back.x(), back.y(), {0.002f, 0, 0.002f}}};
@@ -268,11 +268,12 @@ TEST_CASE("fitter: least squares are sound for few samples and components and fo
     }
   }
   CHECK(fitLobe(lobes[0], wo, settingsFor(FitMethod::ceres)).record.nev < 0.01f);
-  CHECK(fitLobe(lobes[2], wo, settingsFor(FitMethod::ceres)).record.nevCoverage < 1 / 0.9f - 1);  // a tenth is lost
+  // A tenth of the samples is lost to the uniform BSDF sampler.
+  CHECK(fitLobe(lobes[2], wo, settingsFor(FitMethod::ceres)).record.nevCoverage < 1 / 0.9f - 1);
   CHECK(fitLobe(lobes[4], wo, settingsFor(FitMethod::ceres)).record.integral == 0);
 }
 
-TEST_CASE("fitter: the fit that chooses for itself is sound for few samples and odd lobes, and for extreme ones") {
+TEST_CASE("fitter: adaptive fits are valid for few samples and for unusual and extreme lobes") {
   const Vec3 wo = direction(60);
   const Vec2 back = toDisc(wo);
   const Mixture retro{{1, back.x(), back.y(), {0.002f, 0, 0.002f}}};
@@ -295,7 +296,7 @@ TEST_CASE("fitter: the fit that chooses for itself is sound for few samples and 
   }
 }
 
-TEST_CASE("fitter: a fit from a neighbour keeps its components in correspondence") {
+TEST_CASE("fitter: a fit that starts from a neighbour keeps the order of its components") {
   const LobePtr lobe = conductorLobe(0.2, 0.2);
   const Mixture first = fitLobe(*lobe, direction(50), settingsFor(FitMethod::ceres, 4)).mixture;
   const FittedRecord next = fitLobe(*lobe, direction(51), settingsFor(FitMethod::ceres, 4), first);
@@ -307,7 +308,7 @@ TEST_CASE("fitter: a fit from a neighbour keeps its components in correspondence
   CHECK(next.record.nevCoverage < 0.05f);
 }
 
-TEST_CASE("fitter: grids are fitted along chains, elevations and Fibonacci points") {
+TEST_CASE("fitter: grids of both kinds are fitted along chains") {
   for (const DirectionGrid& grid : {DirectionGrid{GridKind::elevation, 20}, DirectionGrid{GridKind::fibonacci, 60}}) {
     const LobePtr lobe = conductorLobe(0.1, grid.kind == GridKind::elevation ? 0.1 : 0.3);
     const FittedGrid fit = fitGrid(*lobe, grid, settingsFor(FitMethod::ceres, 8, 2048));
@@ -316,7 +317,7 @@ TEST_CASE("fitter: grids are fitted along chains, elevations and Fibonacci point
   }
 }
 
-TEST_CASE("fitter: over a grid, least squares are nowhere worse than weighted EM") {
+TEST_CASE("fitter: least squares over a grid is never worse than weighted EM") {
   const DirectionGrid grid{GridKind::elevation, 12};
   for (const char* distribution : {"ggx", "beckmann"}) {
     for (const double alpha : {0.02, 0.05, 0.1, 0.2, 0.3, 0.5}) {
@@ -332,7 +333,7 @@ TEST_CASE("fitter: over a grid, least squares are nowhere worse than weighted EM
   }
 }
 
-TEST_CASE("fitter: methods are known by their names") {
+TEST_CASE("fitter: fit methods convert to names and back") {
   for (const char* name : kFitMethodNames) CHECK(nameOf(fitMethodOf(name).value()) == std::string(name));
   CHECK(!fitMethodOf("magic"));
 }

@@ -1,4 +1,4 @@
-// How often the BSDF is to choose, learnt from paths.
+// The BSDF sampling fraction learnt from paths.
 
 #include <cmath>
 #include <limits>
@@ -13,12 +13,12 @@ using namespace lobe;
 
 namespace {
 
-/// The line in place of directions: the BSDF's density is 1, the mixtures' 2x, on [0,1].
+/// A one-dimensional stand-in for directions: on [0,1] the density of the BSDF is 1, that of the mixtures 2x.
 FractionSample at(float x, float representable) {
   return {0, 1.0f, 2 * x, representable};
 }
 
-/// Samples of a target that is a + (1−a) 2x, drawn evenly.
+/// Uniform samples of the target a + (1−a) 2x.
 std::vector<FractionSample> samplesOf(float a, float representable, int count) {
   std::vector<FractionSample> samples;
   Rng rng(3);
@@ -38,28 +38,28 @@ BsdfSamplingFraction learnt(const std::vector<FractionSample>& samples, int pass
 
 }  // namespace
 
-TEST_CASE("guiding: the share of the BSDF becomes the target's own") {
+TEST_CASE("guiding: the learnt BSDF sampling fraction is the fraction in the target") {
   for (const float a : {0.2f, 0.5f, 0.8f}) CHECK(learnt(samplesOf(a, 1, 20000), 10).bsdf() == Approx(a).margin(0.03));
-  // Where the mixtures may draw 0.8 of the samples at most, a share of 0.5 is 0.4 + 0.2 of the BSDF and 0.4 of them.
+  // If the mixtures can represent only 0.8, a fraction of 0.5 samples 0.5 + 0.2/2 from the BSDF and 0.4 from them.
   CHECK(learnt(samplesOf(0.6f, 0.8f, 20000), 10).bsdf() == Approx(0.5f).margin(0.04));
   CHECK(learnt(samplesOf(0, 1, 20000), 50).bsdf() == Approx(kMinBsdfFraction).margin(0.02));
   CHECK(learnt(samplesOf(1, 1, 20000), 50).bsdf() == Approx(1 - kMinBsdfFraction).margin(0.02));
 }
 
-TEST_CASE("guiding: little evidence moves the share little, and scale none") {
+TEST_CASE("guiding: few samples change the BSDF sampling fraction little and their scale does not matter") {
   CHECK(BsdfSamplingFraction().bsdf() == kProductProbabilities.bsdf);
   CHECK(learnt({}, 3).bsdf() == kProductProbabilities.bsdf);
   CHECK(learnt(samplesOf(1, 1, 1), 1).bsdf() == Approx(kProductProbabilities.bsdf).margin(0.08));
   std::vector<FractionSample> samples = samplesOf(0.7f, 1, 500), scaled = samples, outshone = samples;
   for (FractionSample& s : scaled) s.weight *= 1e6f;
   CHECK(learnt(scaled, 2).bsdf() == Approx(learnt(samples, 2).bsdf()).margin(1e-5));
-  // One sample that outshines all others is one sample.
+  // A sample that is much brighter than all others counts as one sample.
   outshone.push_back(at(0, 1));
   outshone.back().weight = 1e9f;
   CHECK(learnt(outshone, 1).bsdf() == Approx(kProductProbabilities.bsdf).margin(0.08));
 }
 
-TEST_CASE("guiding: samples that say nothing change no share") {
+TEST_CASE("guiding: invalid samples do not change the BSDF sampling fraction") {
   const float infinity = std::numeric_limits<float>::infinity(), nan = std::numeric_limits<float>::quiet_NaN();
   std::vector<FractionSample> samples = samplesOf(0.7f, 1, 500);
   const float before = learnt(samples, 2).bsdf();
@@ -73,7 +73,7 @@ TEST_CASE("guiding: samples that say nothing change no share") {
   CHECK(learnt(samples, 2).bsdf() == before);
 }
 
-TEST_CASE("guiding: each record learns its own share, and keeps it") {
+TEST_CASE("guiding: each record learns and keeps its own BSDF sampling fraction") {
   const auto particlesAt = [](float x, Rng& rng) {
     return Particle{{x + 0.01f * rng.uniform(), 0.01f * rng.uniform(), 0}, Vec3::UnitZ(), Vec3::UnitZ(), 1, 1};
   };

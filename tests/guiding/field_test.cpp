@@ -1,4 +1,4 @@
-// The public interface of the guiding library: what a host tells and asks.
+// The public interface of the guiding library.
 
 #include <cmath>
 #include <limits>
@@ -26,8 +26,8 @@ FieldOptions smallField() {
   return options;
 }
 
-/// A photon somewhere on the unit square of the floor z = 0, from about the direction (0.6, 0, 0.8), and a request
-/// there.
+/// Adds a photon at a random position on the unit square of the floor z = 0, from about the direction (0.6, 0, 0.8),
+/// and a request for a record there.
 void addPath(SampleStorage& storage, std::uint64_t index) {
   Rng rng(5, 0, index);
   const Float3 position{rng.uniform(), rng.uniform(), 0};
@@ -57,7 +57,7 @@ ShadingPoint floorAt(float x, float y) {
 
 }  // namespace
 
-TEST_CASE("guiding: a field does not depend on which thread traced which path") {
+TEST_CASE("guiding: a field does not depend on the assignment of paths to threads") {
   std::vector<int> even, odd;
   for (int i = 0; i < 1000; ++i) (i % 2 == 0 ? even : odd).push_back(i);
   const test::Folder folder;
@@ -73,7 +73,7 @@ TEST_CASE("guiding: a field does not depend on which thread traced which path") 
   CHECK(test::readFile(folder / "a.illum") == test::readFile(folder / "b.illum"));
 }
 
-TEST_CASE("guiding: a field that was loaded is the one that was saved, and is not trained further") {
+TEST_CASE("guiding: a loaded field equals the saved one and cannot be trained further") {
   const test::Folder folder;
   const Field field = trained();
   field.save(folder / "a.illum");
@@ -88,7 +88,7 @@ TEST_CASE("guiding: a field that was loaded is the one that was saved, and is no
   CHECK_THROWS_WITH(Field(options), Catch::Contains("components"));
 }
 
-TEST_CASE("guiding: without a record all directions are the BSDF's") {
+TEST_CASE("guiding: without a record only the BSDF is sampled") {
   const Field field = trained();
   const SurfaceDistribution nowhere(field, floorAt(100, 100));
   CHECK(!nowhere.hasRecord());
@@ -101,7 +101,7 @@ TEST_CASE("guiding: without a record all directions are the BSDF's") {
   CHECK(!nowhere.reflectedRadiance(1));
 }
 
-TEST_CASE("guiding: the distribution at a surface has a density of one, and samples where the light is") {
+TEST_CASE("guiding: the distribution at a surface integrates to one and samples towards the light") {
   const Field field = trained();
   SurfaceDistribution guide(field, floorAt(0.5f, 0.5f));
   REQUIRE(guide.hasRecord());
@@ -133,12 +133,12 @@ TEST_CASE("guiding: the distribution at a surface has a density of one, and samp
   CHECK(towards > 0.9 * guided);
 }
 
-TEST_CASE("guiding: a recorded path tells each vertex the light that arrived there") {
+TEST_CASE("guiding: a recorded path gives each vertex its incident radiance") {
   SampleStorage storage;
   PathRecorder recorder(storage);
   recorder.begin(3);
   const float h = std::sqrt(0.5f);
-  // The throughput behind the first vertex is 0.5, behind the second 0.1; the second looks at light of 8 and then of 2.
+  // The throughput is 0.5 after the first vertex and 0.1 after the second; the path finds light of 1 and then of 0.8.
   recorder.addVertex({.position = {0, 0, 0},
                       .normal = {0, 0, -1},
                       .direction = {h, 0, h},
@@ -162,7 +162,7 @@ TEST_CASE("guiding: a recorded path tells each vertex the light that arrived the
   const std::vector<Particle>& samples = dataOf(storage).samples;
   REQUIRE(samples.size() == 2);
   CHECK(samples[0].weight == Approx(h / 0.25f * (1 / 0.5f + 0.8f / 0.5f)));
-  CHECK(samples[0].normal.z() == 1);  // on the side of the direction
+  CHECK(samples[0].normal.z() == 1);  // flipped to the side of the direction
   CHECK(samples[0].distance == 2);
   CHECK(samples[1].weight == Approx(1 / 0.5f * 8));
   CHECK(samples[1].distance == std::numeric_limits<float>::infinity());

@@ -1,4 +1,4 @@
-// Records, their look-up, training, and the three-strategy density.
+// Illumination records, their look-up and training, and the density of the three sampling strategies.
 
 #include <catch2/catch.hpp>
 
@@ -41,7 +41,7 @@ IlluminationRecord recordAt(const Vec3& x, const Vec3& n, float radius) {
   return r;
 }
 
-/// A cache of one record, and that record as it is used.
+/// A cache of one record, and that record in packed form.
 struct OneRecord {
   explicit OneRecord(const IlluminationRecord& record)
       : cache({record}, 1), packed(*cache.find(record.position, record.normal)) {}
@@ -49,7 +49,7 @@ struct OneRecord {
   const PackedRecord& packed;
 };
 
-/// The rule of IlluminationCache::find, spelt out over all records.
+/// IlluminationCache::find by exhaustive search.
 const IlluminationRecord* bruteForce(std::span<const IlluminationRecord> records, const Vec3& x, const Vec3& n,
                                      float unit) {
   const IlluminationRecord* best = nullptr;
@@ -66,7 +66,7 @@ const IlluminationRecord* bruteForce(std::span<const IlluminationRecord> records
   return best;
 }
 
-/// Particles on the plane z = 0 that see a spot of light around `towards` and a share of uniform light.
+/// Particles on the plane z = 0 from a small light around `towards` and, with probability `background`, from anywhere.
 std::vector<Particle> planeParticles(int count, const Vec3& towards, float background, std::uint64_t seed) {
   std::vector<Particle> particles;
   Rng rng(seed);
@@ -103,7 +103,7 @@ TEST_CASE("guiding: the look-up finds the best valid record") {
   int found = 0;
   for (int i = 0; i < 5000; ++i) {
     Vec3 x = randomPoint(rng) * 1.2f - Vec3::Constant(0.1f), n = randomDirection(rng);
-    if (i % 2 == 0) {  // most normals of the others find none
+    if (i % 2 == 0) {  // most of the other normals find no record
       const IlluminationRecord& near = records[static_cast<std::size_t>(i) % records.size()];
       x = near.position + 0.3f * unit * randomDirection(rng);
       n = (near.normal + 0.3f * n).normalized();
@@ -117,7 +117,7 @@ TEST_CASE("guiding: the look-up finds the best valid record") {
   CHECK(IlluminationCache().find({0, 0, 0}, Vec3::UnitZ()) == nullptr);
 }
 
-TEST_CASE("guiding: records come back as they were given, and few Gaussians take half the room") {
+TEST_CASE("guiding: records are packed without loss and up to four Gaussians take half the memory") {
   Rng rng(17);
   std::vector<IlluminationRecord> records;
   for (int count = 0; count <= kMaxLightComponents; ++count) {
@@ -141,7 +141,7 @@ TEST_CASE("guiding: records come back as they were given, and few Gaussians take
     CHECK(std::memcmp(a.components.data(), b.components.data(), bytes) == 0);
   }
   const IlluminationCache merged = reduced(cache, 1e6f);
-  CHECK(merged.meanComponents() == Approx(8.0 / 9));  // all but the empty one keep one
+  CHECK(merged.meanComponents() == Approx(8.0 / 9));  // all but the empty record keep one component
   CHECK(merged.bytes() < cache.bytes());
   CHECK(reduced(cache, 0).meanComponents() == cache.meanComponents());
   const auto bytesOf = [](IlluminationRecord r, int count) {
@@ -162,7 +162,7 @@ void learn(IlluminationTrainer& trainer, std::span<const Particle> particles, st
   trainer.learn(std::array{particles}, requests);
 }
 
-TEST_CASE("guiding: training finds the light and the background") {
+TEST_CASE("guiding: training learns the direction of the light and the background") {
   const Vec3 towards = Vec3(0.6f, 0.0f, 0.8f);
   IlluminationTrainer trainer({}, 10.0f);
   for (int pass = 0; pass < 6; ++pass)
@@ -180,7 +180,7 @@ TEST_CASE("guiding: training finds the light and the background") {
   CHECK((mean - expected).norm() < 0.05f);
 }
 
-TEST_CASE("guiding: training places no record where no particle is, and none twice") {
+TEST_CASE("guiding: training places records only near particles and no duplicates") {
   IlluminationTrainer trainer({}, 10.0f);
   learn(trainer, {}, planeRequests(10));
   CHECK(trainer.cache().size() == 0);
@@ -193,7 +193,7 @@ TEST_CASE("guiding: training places no record where no particle is, and none twi
   CHECK(trainer.cache().size() == 1);
 }
 
-TEST_CASE("guiding: sources of any scale are learnt from alike, each by its effective number of samples") {
+TEST_CASE("guiding: particle sources of any scale are weighted by their effective number of samples") {
   const Vec3 left = Vec3(-0.6f, 0.0f, 0.8f), right = Vec3(0.6f, 0.0f, 0.8f);
   std::vector<Particle> dim = planeParticles(20000, left, 0.0f, 1), bright = planeParticles(20000, right, 0.0f, 2);
   for (Particle& p : bright) p.weight *= 1e6f;
@@ -207,7 +207,7 @@ TEST_CASE("guiding: sources of any scale are learnt from alike, each by its effe
   CHECK(sum == Approx(500).epsilon(0.3));
   CHECK(std::abs(asymmetry) < 0.2 * sum);
 
-  // One particle that outshines all others is one sample.
+  // A particle that is much brighter than all others counts as one sample.
   dim.front().position = x;
   dim.front().weight = 1e6f;
   sum = 0;
@@ -216,7 +216,7 @@ TEST_CASE("guiding: sources of any scale are learnt from alike, each by its effe
   CHECK(sum == Approx(1).epsilon(0.01));
 }
 
-TEST_CASE("guiding: the nearest particles are found, all of them") {
+TEST_CASE("guiding: the search finds exactly the nearest particles") {
   Rng rng(5);
   std::vector<Particle> particles = planeParticles(3000, Vec3::UnitZ(), 0.5f, 9);
   for (int trial = 0; trial < 20; ++trial) {
@@ -233,7 +233,7 @@ TEST_CASE("guiding: the nearest particles are found, all of them") {
   }
 }
 
-TEST_CASE("guiding: particles behind a thin wall take no places") {
+TEST_CASE("guiding: particles behind a thin wall are not counted as neighbours") {
   Rng rng(8);
   std::vector<Particle> particles;
   for (int i = 0; i < 20000; ++i) {
@@ -248,13 +248,13 @@ TEST_CASE("guiding: particles behind a thin wall take no places") {
   CHECK(found.radius == Approx(std::sqrt(50 / (200 * M_PI))).epsilon(0.2));
 }
 
-TEST_CASE("guiding: bad training options are refused by name") {
+TEST_CASE("guiding: errors name the invalid training option") {
   TrainingOptions options;
   options.components = 9;
   CHECK_THROWS_WITH(options.validate(), Catch::Contains("components"));
   options = {};
   options.unitFraction = 0;
-  CHECK_THROWS_WITH(options.validate(), Catch::Contains("unit-share"));
+  CHECK_THROWS_WITH(options.validate(), Catch::Contains("unitFraction"));
 }
 
 namespace {
@@ -268,7 +268,7 @@ Reflectance someReflectance() {
   return r;
 }
 
-/// Largest deviation, in standard deviations, of histogram counts over the disc from what the density says.
+/// Largest deviation of histogram counts over the disc from the density, in standard deviations.
 double largestDeviation(const GuidedDensity& density, double mutant) {
   constexpr int bins = 12, samples = 400000, fine = 24;
   std::vector<double> counts(bins * bins), expected(bins * bins);
@@ -301,14 +301,14 @@ double largestDeviation(const GuidedDensity& density, double mutant) {
 
 }  // namespace
 
-TEST_CASE("guiding: what is sampled has the density that is said") {
+TEST_CASE("guiding: samples follow the reported density") {
   const Reflectance reflectance = someReflectance();
   const OneRecord record(recordAt(Vec3::Zero(), Vec3::UnitZ(), 1));
   for (const StrategyProbabilities& probabilities : {kProductProbabilities, kGuidedProbabilities}) {
     const GuidedDensity density(reflectance, record.packed, probabilities);
     CHECK(density.bsdfFraction() >= probabilities.bsdf);
     CHECK(largestDeviation(density, 1.0) < 5);
-    CHECK(largestDeviation(density, 1.1) > 5);  // a density that is wrong by a tenth is seen
+    CHECK(largestDeviation(density, 1.1) > 5);  // an error of a tenth in the density is detected
   }
 }
 
@@ -330,18 +330,18 @@ IlluminationRecord oneLight(const Gaussian& g) {
 
 }  // namespace
 
-TEST_CASE("guiding: lobes at the limits of what can be are sampled with the density that is said") {
+TEST_CASE("guiding: samples of extreme lobes follow the reported density") {
   struct Case {
     const char* name;
     Gaussian reflectance, light;
   };
   const auto round = [](float x, float y, float width) { return Gaussian{1, x, y, {width * width, 0, width * width}}; };
   const std::array cases{
-      Case{"a thousandth wide", round(0.4f, 0.3f, 1e-3f), round(0.401f, 0.3f, 1e-3f)},
-      Case{"a thousandth wide in broad light", round(0.4f, 0.3f, 1e-3f), round(0.2f, 0, 0.3f)},
+      Case{"standard deviation 0.001", round(0.4f, 0.3f, 1e-3f), round(0.401f, 0.3f, 1e-3f)},
+      Case{"standard deviation 0.001 under broad light", round(0.4f, 0.3f, 1e-3f), round(0.2f, 0, 0.3f)},
       Case{"almost too far apart", round(-0.4f, 0, 0.05f), round(0.4f, 0, 0.05f)},
       Case{"means outside the disc", round(1.1f, 0.1f, 0.2f), round(0.95f, 0.6f, 0.3f)},
-      Case{"next to nothing inside the disc", round(1.5f, 0, 0.05f), round(1.55f, 0.1f, 0.05f)},
+      Case{"almost no mass inside the disc", round(1.5f, 0, 0.05f), round(1.55f, 0.1f, 0.05f)},
   };
   for (std::size_t i = 0; i < cases.size(); ++i) {
     const Reflectance reflectance = oneLobe(cases[i].reflectance);
@@ -357,7 +357,7 @@ TEST_CASE("guiding: lobes at the limits of what can be are sampled with the dens
   }
 }
 
-TEST_CASE("guiding: without a product its share goes to the BSDF") {
+TEST_CASE("guiding: without a product its probability is added to the BSDF sampling fraction") {
   Reflectance far;
   far.backgroundMass = 0.4f;
   far.gaussians.add({1.0f, 50.0f, 50.0f, {1e-6f, 0, 1e-6f}});
@@ -368,13 +368,13 @@ TEST_CASE("guiding: without a product its share goes to the BSDF") {
   CHECK(density.guidedPdf({0.6f, 0, -0.8f}) == 0);
 }
 
-TEST_CASE("guiding: a diffuse point takes the illumination mixture as it is") {
+TEST_CASE("guiding: at a diffuse point the product is the illumination mixture") {
   Reflectance diffuse;
   diffuse.constant = 0.5f / kPi;
   diffuse.backgroundMass = diffuse.constant;
   const OneRecord record(recordAt(Vec3::Zero(), Vec3::UnitZ(), 1));
   const GuidedDensity density(diffuse, record.packed, {0.9f, 0.1f, 0.0f});
-  // Background 0.3 of the product is the BSDF's own sampling: 0.1 + 0.9·0.3.
+  // The background, a fraction 0.3 of the product, is sampled by the BSDF: 0.1 + 0.9·0.3.
   CHECK(density.bsdfFraction() == Approx(0.37f));
   const Vec3 wi = Vec3(0.3f, 0.1f, 0.9f).normalized();
   CHECK(density.guidedPdf(wi) ==

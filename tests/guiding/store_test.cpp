@@ -1,4 +1,4 @@
-// Trained illumination comes back from its file as it was.
+// Trained illumination survives being written to a file and read back.
 
 #include <unistd.h>
 
@@ -55,7 +55,7 @@ bool sameRecord(const IlluminationRecord& a, const IlluminationRecord& b) {
 
 }  // namespace
 
-TEST_CASE("guiding: a stored cache has the same records and finds them at the same places") {
+TEST_CASE("guiding: a stored cache has the same records and the same look-ups") {
   Rng rng(3, 0, 0);
   std::vector<IlluminationRecord> records;
   for (int i = 0; i < 300; ++i) records.push_back(randomRecord(rng));
@@ -81,7 +81,7 @@ TEST_CASE("guiding: a stored cache has the same records and finds them at the sa
   CHECK(found < 2000);
 }
 
-TEST_CASE("guiding: a cache without records is stored, too") {
+TEST_CASE("guiding: a cache without records can be stored") {
   const IlluminationCache read = writtenAndRead(IlluminationCache());
   CHECK(read.size() == 0);
   CHECK(read.find(Vec3::Zero(), Vec3::UnitZ()) == nullptr);

@@ -1,4 +1,4 @@
-// Film, errors and image files.
+// Film, error metrics and image files.
 
 #include <filesystem>
 #include <fstream>
@@ -33,7 +33,7 @@ Image gradient(int width, int height) {
 
 }  // namespace
 
-TEST_CASE("render: a film drops and counts what is no radiance") {
+TEST_CASE("render: a film drops and counts samples that are negative or not finite") {
   Film film(2, 1);
   film.add(0, 0, {1, 2, 3});
   film.add(0, 0, {kNan, 0, 0});
@@ -49,7 +49,7 @@ TEST_CASE("render: a film drops and counts what is no radiance") {
   CHECK(std::isinf(variance.at(1, 0).x()));
 }
 
-TEST_CASE("render: errors of images made by hand") {
+TEST_CASE("render: error metrics of simple images") {
   Image reference(10, 10, grey(0.5f));
   SECTION("equal") {
     const ErrorMetrics m = compareImages(reference, reference);
@@ -58,7 +58,7 @@ TEST_CASE("render: errors of images made by hand") {
     CHECK(m.meanRatio == 1);
     CHECK(m.nonfinite == 0);
   }
-  SECTION("brighter by a tenth") {
+  SECTION("brighter by 0.1") {
     const ErrorMetrics m = compareImages(reference, Image(10, 10, grey(0.6f)));
     CHECK(m.mse == Approx(0.01));
     CHECK(m.relmse == Approx(0.01 / 0.26));
@@ -94,7 +94,7 @@ TEST_CASE("render: errors of images made by hand") {
   }
 }
 
-TEST_CASE("render: worst pixels are left out by share") {
+TEST_CASE("render: metrics can leave out a fraction of the worst pixels") {
   Image reference(100, 20, grey(0.0f)), image = reference;
   for (int i = 0; i < 20; ++i) image.pixels[i * 97] = grey(i < 2 ? 10.0f : 1.0f);
   const ErrorMetrics m = compareImages(reference, image);
@@ -103,7 +103,7 @@ TEST_CASE("render: worst pixels are left out by share") {
   CHECK(m.relmseDrop1 == 0);
 }
 
-TEST_CASE("render: images come back from files") {
+TEST_CASE("render: images are read back from files") {
   const Folder folder;
   const Image image = gradient(13, 7);
   SECTION("exr keeps the floats") {
@@ -124,14 +124,14 @@ TEST_CASE("render: images come back from files") {
     for (std::size_t i = 0; i < image.pixels.size(); ++i)
       CHECK((back.pixels[i] - image.pixels[i].min(1.0f)).abs().maxCoeff() < 0.01f);
   }
-  SECTION("other endings are refused") {
+  SECTION("other extensions are rejected") {
     CHECK_THROWS_WITH(writeImage(folder / "a.jpg", image), Catch::Contains("a.jpg") && Catch::Contains(".exr or .png"));
     CHECK_THROWS_WITH(writeImage(folder / "missing" / "a.exr", image), Catch::Contains("a.exr"));
   }
-  CHECK(folder.files() <= 2);  // nothing temporary is left
+  CHECK(folder.files() <= 2);  // no temporary files remain
 }
 
-TEST_CASE("render: errors have colours") {
+TEST_CASE("render: error colours increase monotonically with the error") {
   CHECK(errorColour(0).isZero());
   CHECK((errorColour(1e9f) - Rgb::Ones()).abs().maxCoeff() < 1e-6f);
   CHECK(errorColour(kNan).z() == 1);

@@ -1,4 +1,4 @@
-// Pictures made in parts: the mean by samples, what is kept of their attributes, and what is refused.
+// Merging of images: the sample-weighted mean, the attributes that are kept, and invalid input.
 
 #include <fmt/format.h>
 
@@ -14,7 +14,7 @@ ImageAttributes madeOf(const std::string& integrator, double seed, double offset
   return {{"integrator", integrator}, {"seed", seed}, {"sampleOffset", offset}, {"samples", samples}};
 }
 
-/// Pictures of 3×2 pixels in a folder of their own.
+/// Images of 3×2 pixels in a temporary folder.
 struct Pictures {
   Folder folder;
   std::vector<std::filesystem::path> paths;
@@ -35,7 +35,7 @@ struct Pictures {
 
 }  // namespace
 
-TEST_CASE("render: merged pictures are the mean by samples") {
+TEST_CASE("render: merged images are the sample-weighted mean") {
   Pictures p;
   p.add(1.0f, madeOf("path", 1, 0, 3));
   p.add(2.0f, madeOf("path", 1, 3, 1));
@@ -45,7 +45,7 @@ TEST_CASE("render: merged pictures are the mean by samples") {
   CHECK(merged.attributes == madeOf("path", 1, 0, 4));
 }
 
-TEST_CASE("render: merged pictures say what they are made of, and can be merged again") {
+TEST_CASE("render: merged images list their sample ranges and can be merged again") {
   Pictures p;
   p.add(1, madeOf("path", 1, 0, 4));
   p.add(1, madeOf("path", 1, 8, 4));
@@ -58,7 +58,7 @@ TEST_CASE("render: merged pictures say what they are made of, and can be merged 
   CHECK(merged.attributes.count("sampleOffset") == 0);
   writeImage(p.paths[3], merged.image, merged.attributes);
 
-  // The gap filled, path's samples are one range.
+  // Filling the gap joins the samples of path into one range.
   Pictures again;
   again.add(1, madeOf("path", 1, 4, 4));
   again.paths.push_back(p.paths[3]);
@@ -70,12 +70,12 @@ TEST_CASE("render: merged pictures say what they are made of, and can be merged 
   twice.add(1, madeOf("path", 1, 11, 1));
   twice.paths.push_back(p.paths[3]);
   CHECK(twice.fault() ==
-        fmt::format("{} and {}: both have samples 11 to 11 of seed 1 by path: render one with another --sample-offset "
-                    "or --seed",
+        fmt::format("{} and {}: both contain samples 11 to 11 of seed 1 and integrator path; change --sample-offset or "
+                    "--seed of one",
                     twice.paths[0].string(), twice.paths[1].string()));
 }
 
-TEST_CASE("render: the same samples of another seed or integrator are others") {
+TEST_CASE("render: equal sample ranges of another seed or integrator can be merged") {
   Pictures p;
   p.add(1, madeOf("path", 1, 0, 4));
   p.add(1, madeOf("path", 2, 0, 4));
@@ -83,10 +83,10 @@ TEST_CASE("render: the same samples of another seed or integrator are others") {
   CHECK(p.fault().empty());
   p.add(1, madeOf("path", 2, 3, 1));
   CHECK_THAT(p.fault(), Catch::Contains(p.paths[1].string() + " and " + p.paths[3].string()) &&
-                            Catch::Contains("samples 3 to 3 of seed 2 by path"));
+                            Catch::Contains("samples 3 to 3 of seed 2 and integrator path"));
 }
 
-TEST_CASE("render: attributes that all pictures share are kept, and of times and unknown seeds nothing is claimed") {
+TEST_CASE("render: merging keeps attributes that all images have in common except times") {
   Pictures p;
   p.add(1, {{"samples", 4.0}, {"software", "x"}, {"cacheHashes", "a"}, {"seconds", 3.0}});
   p.add(3, {{"samples", 4.0}, {"software", "x"}, {"cacheHashes", "b"}, {"seconds", 3.0}});
@@ -94,11 +94,12 @@ TEST_CASE("render: attributes that all pictures share are kept, and of times and
   CHECK(attributes == ImageAttributes{{"samples", 8.0}, {"software", "x"}});
 }
 
-TEST_CASE("render: pictures that cannot be merged are named") {
+TEST_CASE("render: errors name the images that cannot be merged") {
   Pictures sizes;
   sizes.add(1, madeOf("path", 1, 0, 4));
   sizes.add(1, madeOf("path", 1, 4, 4), 4);
-  CHECK(sizes.fault() == fmt::format("{}: has 4x2 pixels, {} 3x2", sizes.paths[1].string(), sizes.paths[0].string()));
+  CHECK(sizes.fault() ==
+        fmt::format("{}: has 4x2 pixels, but {} has 3x2", sizes.paths[1].string(), sizes.paths[0].string()));
   for (const ImageAttributes& attributes :
        {ImageAttributes{}, {{"samples", 0.0}}, {{"samples", -1.0}}, {{"samples", 1.5}}, {{"samples", "many"}}}) {
     Pictures p;
@@ -120,7 +121,7 @@ TEST_CASE("render: pictures that cannot be merged are named") {
   CHECK_THAT(png.fault(), Catch::Contains("none.exr"));
 }
 
-TEST_CASE("render: lobecompare --merge writes what loberender's pictures are together") {
+TEST_CASE("render: lobecompare --merge writes the merged image") {
   Pictures p;
   p.add(1, madeOf("path", 1, 0, 3));
   p.add(2, madeOf("path", 1, 3, 1));

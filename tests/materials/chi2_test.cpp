@@ -1,4 +1,4 @@
-// Every sampler of materials/ against its density, and the χ² test against samplers that are wrong.
+// χ² tests of all samplers of materials/, and of wrong densities, which the χ² test must reject.
 
 #include <catch2/catch.hpp>
 
@@ -44,7 +44,7 @@ Chi2Result testBsdf(const Bsdf& bsdf, const Vec3& wo, std::uint64_t seed) {
 
 }  // namespace
 
-TEST_CASE("materials: the chi-square test passes right samplers of square and sphere") {
+TEST_CASE("materials: the chi-square test accepts correct samplers of the square and the sphere") {
   Rng rng(1);
   const auto square = [&]() -> std::optional<Eigen::Vector2d> {
     const Vec2 u = rng.uniform2();
@@ -59,7 +59,7 @@ TEST_CASE("materials: the chi-square test passes right samplers of square and sp
   CHECK(round.passed());
 }
 
-TEST_CASE("materials: the chi-square test fails wrong densities") {
+TEST_CASE("materials: the chi-square test rejects wrong densities") {
   Rng rng(2);
   const auto sampler = [&]() -> std::optional<Vec3> { return squareToCosineHemisphere(rng.uniform2()); };
   const auto judge = [&](auto density) { return chi2Sphere(sampler, density); };
@@ -72,7 +72,7 @@ TEST_CASE("materials: the chi-square test fails wrong densities") {
   CHECK_FALSE(judge([](const Vec3& w) { return cosineHemispherePdf(w) * (1.0f + 0.1f * w.x()); }).passed(1000));
 }
 
-TEST_CASE("materials: the chi-square test fails a lobe whose density is that of a slightly other roughness") {
+TEST_CASE("materials: the chi-square test rejects the density of a lobe with slightly different roughness") {
   for (const char* distribution : {"ggx", "beckmann"}) {
     const BsdfPtr drawn = roughConductor(distribution, {0.1, 0.1});
     const BsdfPtr claimed = roughConductor(distribution, {0.11, 0.11});
@@ -89,7 +89,7 @@ TEST_CASE("materials: the chi-square test fails a lobe whose density is that of 
   }
 }
 
-TEST_CASE("materials: every rough lobe samples its density", "[slow]") {
+TEST_CASE("materials: samples of rough lobes match their density", "[slow]") {
   constexpr int kTests = 2 * static_cast<int>(std::size(kRoughness) * std::size(kViews));
   std::uint64_t seed = 100;
   for (const std::string distribution : {"ggx", "beckmann"})
@@ -103,7 +103,7 @@ TEST_CASE("materials: every rough lobe samples its density", "[slow]") {
     }
 }
 
-TEST_CASE("materials: narrow lobes sample their density down to alpha 0.001 and 89.99 degrees", "[slow]") {
+TEST_CASE("materials: samples of narrow lobes match their density for alpha 0.001 up to 89.99 degrees", "[slow]") {
   std::uint64_t seed = 200;
   for (const std::string distribution : {"ggx", "beckmann"})
     for (const double elevation : {0.01, 60.0, 89.0, 89.99}) {
@@ -114,7 +114,7 @@ TEST_CASE("materials: narrow lobes sample their density down to alpha 0.001 and 
     }
 }
 
-TEST_CASE("materials: every model samples its density") {
+TEST_CASE("materials: samples of every model match its density") {
   const BsdfPtr diffuse = bsdfOf("diffuse");
   const BsdfPtr plastic = bsdfOf("plastic");
   const BsdfPtr shiny = bsdfOf("roughplastic", {{"alpha", 0.05}, {"distribution", std::string("ggx")}});

@@ -1,4 +1,4 @@
-// Coatings against what they are in closed form.
+// Coatings compared with closed forms.
 
 #include <catch2/catch.hpp>
 
@@ -36,7 +36,7 @@ double cosineInside(double cosine, double eta) {
   return std::sqrt(1.0 - (1.0 - cosine * cosine) / (eta * eta));
 }
 
-/// The albedo by the model's own sampling.
+/// The albedo estimated with the model's own sampler.
 Mean sampledAlbedo(const Bsdf& bsdf, const Vec3& wo, int samples) {
   Rng rng(21);
   Mean albedo;
@@ -56,7 +56,7 @@ Mean sampledAlbedo(const Bsdf& bsdf, const Vec3& wo, int samples) {
 
 }  // namespace
 
-TEST_CASE("materials: a coating of the index outside is what it coats") {
+TEST_CASE("materials: a coating with the index of the outside equals its nested model") {
   const BsdfPtr shiny = bsdfOf("twosided", {}, {bsdfOf("roughplastic", {{"alpha", 0.2}})});
   const BsdfPtr clear = coated(shiny, 1.0);
   Rng rng(22);
@@ -75,7 +75,7 @@ TEST_CASE("materials: a coating of the index outside is what it coats") {
   CHECK(mirrored->wi.isApprox(Vec3(-wo.x(), -wo.y(), wo.z()), 1e-5f));
 }
 
-TEST_CASE("materials: of a coating over black only its own reflection is left") {
+TEST_CASE("materials: a coating over black has only its own reflection") {
   const BsdfPtr smooth = coated(diffuseOf(0.0), 1.5);
   const BsdfPtr rough = roughlyCoated(diffuseOf(0.0), 0.3, 1.5);
   const Microfacet facets(Microfacet::Kind::beckmann, 0.3, 0.3);
@@ -97,7 +97,7 @@ TEST_CASE("materials: of a coating over black only its own reflection is left") 
   }
 }
 
-TEST_CASE("materials: a coated diffuse surface by hand") {
+TEST_CASE("materials: a coated diffuse surface matches the closed form") {
   constexpr double kEta = 1.6, kDepth = 0.3;
   const BsdfPtr smooth = coated(diffuseOf(0.8), kEta, kDepth);
   const BsdfPtr rough = roughlyCoated(diffuseOf(0.8), 0.25, kEta, kDepth);
@@ -116,7 +116,7 @@ TEST_CASE("materials: a coated diffuse surface by hand") {
   }
 }
 
-TEST_CASE("materials: a coated mirror by hand") {
+TEST_CASE("materials: a coated mirror matches the closed form") {
   constexpr double kEta = 1.5, kDepth = 0.4;
   const BsdfPtr bsdf = coated(mirrorOf(0.9), kEta, kDepth);
   for (const double elevation : {0.0, 50.0, 80.0}) {
@@ -136,11 +136,11 @@ TEST_CASE("materials: a coated mirror by hand") {
   }
 }
 
-TEST_CASE("materials: a coated white surface loses what the coating throws back from within") {
+TEST_CASE("materials: a coated white surface loses the light that the coating reflects internally") {
   for (const double eta : {0.8, 1.3, 1.8}) {
     const BsdfPtr smooth = coated(diffuseOf(1.0), eta);
     const Vec3 wo = directionAt(40.0, 10.0);
-    // Of diffuse light from within, 1 − F̄(1/η) gets out.
+    // The fraction 1 − F̄(1/η) of diffuse light from inside leaves the coating.
     const double expected = 1.0 - passing(wo.z(), eta) * fresnelDiffuse(1.0 / eta);
     const Mean found = sampledAlbedo(*smooth, wo, 40000);
     CHECK(found.value() == Approx(expected).margin(4.0 * found.error()));
@@ -148,8 +148,8 @@ TEST_CASE("materials: a coated white surface loses what the coating throws back 
   }
 }
 
-TEST_CASE("materials: the parts of coated glossy surfaces add up") {
-  // Narrow, so that no part of the lobe meets the coating from within beyond the critical angle.
+TEST_CASE("materials: the albedo of coated glossy surfaces matches sampling") {
+  // Narrow, so that no part of the lobe is totally reflected inside the coating.
   const BsdfPtr metal = bsdfOf("roughconductor", {{"alpha", 0.02}, {"material", std::string("Ag")}});
   const BsdfPtr plastic = bsdfOf("plastic");
   const std::initializer_list<BsdfPtr> models = {coated(metal, 1.5, 0.1), roughlyCoated(metal, 0.1, 1.5),
@@ -163,7 +163,7 @@ TEST_CASE("materials: the parts of coated glossy surfaces add up") {
       CHECK(found.value() < 1.0);
       CHECK(luminance(bsdf->albedo(wo, kUv)) == Approx(found.value()).margin(0.03));
     }
-  // Of a metal under a coating, nothing is described but the coating.
+  // The mixture describes only the coating and not the metal below.
   CHECK(coated(metal, 1.5)->lobes().empty());
   CHECK(coated(metal, 1.5)->mixture(Vec3::UnitZ(), kUv).undescribedFraction == 1.0f);
   const LobeMixture rough = roughlyCoated(metal, 0.1, 1.5)->mixture(Vec3::UnitZ(), kUv);
@@ -173,7 +173,7 @@ TEST_CASE("materials: the parts of coated glossy surfaces add up") {
   CHECK(coated(diffuseOf(0.5), 1.5)->mixture(Vec3::UnitZ(), kUv).undescribedFraction == 0.0f);
 }
 
-TEST_CASE("materials: what is wrong with a coating is told") {
+TEST_CASE("materials: errors in coatings are reported") {
   const auto messageOf = [](const std::string& type,
                             std::initializer_list<std::pair<std::string, ParameterValue>> values,
                             std::initializer_list<BsdfPtr> children) -> std::string {

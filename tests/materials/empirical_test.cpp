@@ -1,4 +1,4 @@
-// Phong, Ward and rough diffuse surfaces against closed forms and numerical integrals.
+// Phong, Ward and rough diffuse models compared with closed forms and numerical integrals.
 
 #include <catch2/catch.hpp>
 
@@ -8,7 +8,7 @@
 namespace lobe {
 namespace {
 
-/// ∫ f cosθ dω over the upper hemisphere, first component, by the midpoint rule; equal steps of θ² hold narrow peaks
+/// ∫ f cosθ dω over the upper hemisphere, first component, by the midpoint rule; equal steps of √θ resolve narrow peaks
 /// about the normal.
 double albedoByQuadrature(const Bsdf& bsdf, const Vec3& wo, int steps = 400) {
   double sum = 0.0;
@@ -33,13 +33,13 @@ BsdfPtr ward(const std::string& variant, double alphaU, double alphaV) {
 
 }  // namespace
 
-TEST_CASE("materials: Phong reflects its two colours at normal incidence, by Phong's cosine") {
+TEST_CASE("materials: the albedo of Phong at normal incidence and its values match the closed forms") {
   for (const double exponent : {0.0, 1.0, 10.0, 100.0}) {
     const BsdfPtr phong =
         bsdfOf("phong",
                {{"exponent", exponent}, {"specular_reflectance", 0.6}, {"diffuse_reflectance", Rgb(0.3f, 0.2f, 0.1f)}});
     CHECK(albedoByQuadrature(*phong, Vec3::UnitZ()) == Approx(0.9).epsilon(1e-3));
-    // 30 degrees off the mirror direction of 40 degrees.
+    // 30 degrees from the mirror direction, at 40 degrees.
     const double expected =
         (exponent + 2.0) / (2.0 * std::numbers::pi) * 0.6 * std::pow(std::cos(std::numbers::pi / 6.0), exponent) +
         0.3 / std::numbers::pi;
@@ -52,16 +52,17 @@ TEST_CASE("materials: Phong reflects its two colours at normal incidence, by Pho
   CHECK(plain->lobes()[0]->kind() == LobeKind::isotropic);
 }
 
-TEST_CASE("materials: every variant of Ward's model reflects its colour at normal incidence") {
-  // The bell is normalised for small roughness only, apart from the balanced variant, which loses what goes below.
+TEST_CASE("materials: the albedo of every Ward variant at normal incidence is its colour") {
+  // The Gaussian is normalised only for small roughness. The balanced variant loses what is reflected below the
+  // surface.
   for (const char* variant : {"ward", "ward-duer", "balanced"})
     CHECK(albedoByQuadrature(*ward(variant, 0.1, 0.05), Vec3::UnitZ(), 800) == Approx(1.0).epsilon(0.03));
 }
 
-TEST_CASE("materials: Ward's variants are what their authors write") {
+TEST_CASE("materials: Ward's variants match the published formulas") {
   const Vec3 wo = directionAt(35.0, 20.0);
   const Vec3 wi = directionAt(50.0, 190.0);
-  const Eigen::Vector3d h = (wo + wi).cast<double>();  // not unit, as in the balanced model's paper
+  const Eigen::Vector3d h = (wo + wi).cast<double>();  // not normalised, as in the paper of the balanced model
   const double alphaU = 0.2, alphaV = 0.4;
   const double bell = std::exp(-(std::pow(h.x() / alphaU, 2) + std::pow(h.y() / alphaV, 2)) / (h.z() * h.z())) /
                       (std::numbers::pi * alphaU * alphaV);
@@ -75,7 +76,7 @@ TEST_CASE("materials: Ward's variants are what their authors write") {
   CHECK(ward("ward", 0.1, 0.2)->lobes()[0]->kind() == LobeKind::anisotropic);
 }
 
-TEST_CASE("materials: Ward's and Dür's variants stay finite and reciprocal where their albedo has no bound") {
+TEST_CASE("materials: Ward's and Dür's variants are finite and reciprocal at grazing angles") {
   Rng rng(41);
   for (const char* variant : {"ward", "ward-duer"}) {
     const BsdfPtr bsdf = ward(variant, 0.3, 0.1);
@@ -91,7 +92,7 @@ TEST_CASE("materials: Ward's and Dür's variants stay finite and reciprocal wher
   }
 }
 
-TEST_CASE("materials: a rough diffuse surface of no roughness is diffuse") {
+TEST_CASE("materials: roughdiffuse with zero roughness equals diffuse") {
   for (const bool fast : {false, true}) {
     const BsdfPtr smooth = bsdfOf("roughdiffuse", {{"alpha", 0.0}, {"reflectance", 0.7}, {"use_fast_approx", fast}});
     const BsdfPtr diffuse = bsdfOf("diffuse", {{"reflectance", 0.7}});
@@ -106,7 +107,7 @@ TEST_CASE("materials: a rough diffuse surface of no roughness is diffuse") {
   }
 }
 
-TEST_CASE("materials: rough diffuse surfaces have the albedo they claim, and throw light back") {
+TEST_CASE("materials: the albedo of roughdiffuse matches quadrature and its values are retroreflective") {
   for (const bool fast : {false, true})
     for (const double alpha : {0.2, 0.6})
       for (const double elevation : {0.0, 40.0, 75.0}) {
@@ -118,27 +119,27 @@ TEST_CASE("materials: rough diffuse surfaces have the albedo they claim, and thr
         if (elevation > 0.0)
           CHECK(rough->eval(wo, wo, kUv).x() > 1.01f * rough->eval(wo, directionAt(elevation, 210.0), kUv).x());
       }
-  // The fast form by hand: σ² = α²/2, both at 60 degrees and azimuths 60 degrees apart.
+  // The fast approximation in closed form: σ² = α²/2, both directions at 60 degrees, azimuths 60 degrees apart.
   const double s = 0.5 * 0.6 * 0.6;
   const double root3 = std::sqrt(3.0);
   const double expected =
       0.8 / std::numbers::pi * (1.0 - 0.5 * s / (s + 0.33) + 0.45 * s / (s + 0.09) * 0.5 * (0.5 * root3) * root3);
   const BsdfPtr fast = bsdfOf("roughdiffuse", {{"alpha", 0.6}, {"reflectance", 0.8}, {"use_fast_approx", true}});
   CHECK(fast->eval(directionAt(60.0, 10.0), directionAt(60.0, 70.0), kUv).x() == Approx(expected).epsilon(1e-4));
-  // The full form by hand: 60 and 30 degrees, azimuths opposite.
+  // The full model in closed form: 60 and 30 degrees, opposite azimuths.
   const double c = s / (s + 0.09);
   const double once = 1.0 - 0.5 * s / (s + 0.33) - 0.45 * c * (0.5 * root3 - 1.0 / 27.0) / root3;
   const double twice = 0.17 * s / (s + 0.13) * (1.0 + 1.0 / 9.0);
   const BsdfPtr full = bsdfOf("roughdiffuse", {{"alpha", 0.6}, {"reflectance", 0.8}});
   CHECK(full->eval(directionAt(60.0), directionAt(30.0, 180.0), kUv).x() ==
         Approx(0.8 / std::numbers::pi * (once + 0.8 * twice)).epsilon(1e-4));
-  // And across: azimuths 90 degrees apart leave the oblique term, in which 4αβ/π² is 2/9 and the tangent 1.
+  // Azimuths 90 degrees apart: only the oblique term remains, in which 4αβ/π² is 2/9 and the tangent 1.
   const double across = 1.0 - 0.5 * s / (s + 0.33) + 0.125 * c * std::pow(2.0 / 9.0, 2);
   CHECK(full->eval(directionAt(60.0), directionAt(30.0, 90.0), kUv).x() ==
         Approx(0.8 / std::numbers::pi * (across + 0.8 * 0.17 * s / (s + 0.13))).epsilon(1e-4));
 }
 
-TEST_CASE("materials: what is wrong with empirical models is told") {
+TEST_CASE("materials: errors in empirical models are reported") {
   using Catch::Matchers::Contains;
   const auto message = [](const std::string& type,
                           std::initializer_list<std::pair<std::string, ParameterValue>> values) {

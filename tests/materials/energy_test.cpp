@@ -1,4 +1,4 @@
-// What physics and estimators ask of every model: reciprocity, energy, furnaces, samples that agree with eval and pdf.
+// Tests of every model: reciprocity, energy conservation, white furnaces, samples that agree with eval and pdf.
 
 #include <catch2/catch.hpp>
 
@@ -18,10 +18,10 @@ struct Named {
   double mostAlbedo = 1.0;  ///< above 1 for models that are known to create energy at grazing angles
 };
 
-/// Its smooth interface reflects all at grazing angles, and nothing is taken from the diffuse part for that.
+/// The principled interface reflects everything at grazing angles, but the diffuse part is not reduced accordingly.
 constexpr double kPrincipledAlbedo = 1.1;
 
-/// One of each kind of smooth reflection, in several roughnesses.
+/// All models with a smooth part, with several values of roughness.
 std::vector<Named> smoothModels() {
   std::vector<Named> models = {
       {"diffuse", bsdfOf("diffuse", {{"reflectance", Rgb(0.9f, 0.5f, 0.1f)}})},
@@ -121,7 +121,7 @@ TEST_CASE("materials: reflection is reciprocal") {
     double worst = 0.0;
     for (int i = 0; i < 2000; ++i) {
       const Vec3 wo = squareToCosineHemisphere(rng.uniform2());
-      // Half of the pairs are near mirrors of each other, where narrow lobes live.
+      // Half of the pairs are near mirror directions, where narrow lobes are large.
       Vec3 wi = squareToCosineHemisphere(rng.uniform2());
       if (i % 2) wi = (Vec3(-wo.x(), -wo.y(), wo.z()) + 0.002f * wi).normalized();
       const Rgb a = model.bsdf->eval(wo, wi, kUv);
@@ -132,7 +132,7 @@ TEST_CASE("materials: reflection is reciprocal") {
   }
 }
 
-TEST_CASE("materials: a sample carries the value and the density of its direction, and a bounded weight") {
+TEST_CASE("materials: samples have the value and density of their direction and a bounded weight") {
   Rng rng(12);
   for (const Named& model : smoothModels())
     for (const double elevation : kElevations) {
@@ -157,7 +157,7 @@ TEST_CASE("materials: a sample carries the value and the density of its directio
     }
 }
 
-TEST_CASE("materials: eval and pdf are finite and never negative, whatever the directions") {
+TEST_CASE("materials: eval and pdf are finite and not negative for all directions") {
   Rng rng(13);
   const float edge[] = {0.0f, -0.0f, 1e-38f, 1e-12f, 1e-6f, -1e-6f, 1.0f, -1.0f};
   for (const Named& model : smoothModels()) {
@@ -180,7 +180,7 @@ TEST_CASE("materials: eval and pdf are finite and never negative, whatever the d
   }
 }
 
-TEST_CASE("materials: no model reflects more than it receives, and mixture and albedo are near the truth") {
+TEST_CASE("materials: no model creates energy and mixture and albedo are accurate") {
   for (const Named& model : smoothModels())
     for (const double elevation : kElevations) {
       INFO(model.name << " seen at " << elevation);
@@ -203,7 +203,7 @@ TEST_CASE("materials: no model reflects more than it receives, and mixture and a
       }
       CHECK(smooth.value() <= model.mostAlbedo + 4.0 * smooth.error() + 1e-4);
       CHECK(total.value() <= model.mostAlbedo + 4.0 * total.error() + 1e-4);
-      // A right sum over lobes and constant.
+      // The albedo of the mixture: the sum over its lobes and the constant.
       const LobeMixture mixture = model.bsdf->mixture(wo, kUv);
       double modelled = mixture.constant;
       for (int i = 0; i < mixture.glossyCount; ++i) {
@@ -221,26 +221,26 @@ TEST_CASE("materials: no model reflects more than it receives, and mixture and a
     }
 }
 
-TEST_CASE("materials: the mixture of a rough plastic is its value") {
+TEST_CASE("materials: the mixture of rough plastic approximates its value near the mirror direction") {
   const BsdfPtr bsdf = bsdfOf("roughplastic", {{"alpha", 0.2}, {"specular_reflectance", grey(0.7f)}});
   const Vec3 wo = directionAt(50.0);
   const LobeMixture mixture = bsdf->mixture(wo, kUv);
   REQUIRE(mixture.glossyCount == 1);
   CHECK(mixture.glossy[0].tint == Approx(0.7f));
-  // Near the mirror direction the lobe is all; the constant is an average over wi.
+  // Near the mirror direction the lobe dominates; the constant is an average over wi.
   const Vec3 wi = directionAt(50.0, 180.0);
   const double modelled = mixture.glossy[0].tint * bsdf->lobes()[0]->eval(wo, wi) + mixture.constant * kInvPi;
   CHECK(modelled == Approx(luminance(bsdf->eval(wo, wi, kUv))).epsilon(0.02));
 }
 
-TEST_CASE("materials: visible normals fill the projected area: the weak white furnace") {
-  // ∫ G1(wo) D(h) / (4 cosθo) dwi = 1 over the whole sphere, wi mirrored at h.
+TEST_CASE("materials: distributions of normals pass the weak white furnace test") {
+  // ∫ G1(wo) D(h) / (4 cosθo) dwi = 1 over the whole sphere, where wi is wo reflected at h.
   for (const auto kind : {Microfacet::Kind::beckmann, Microfacet::Kind::ggx})
     for (const double alpha : {0.05, 0.4, 1.0})
       for (const double elevation : {0.0, 50.0, 85.0, 89.0}) {
         const Microfacet m(kind, alpha, std::min(1.0, 2.0 * alpha));
         const Eigen::Vector3d wo = directionAt(elevation, 25.0).cast<double>().normalized();
-        // Over normals instead: dwi = 4 (wo·h) dh. Midpoint rule over h in tan θ, where the distributions live.
+        // Integrated over normals: dwi = 4 (wo·h) dh. Midpoint rule over the slope tan θ of h.
         double sum = 0.0;
         constexpr int kSteps = 700;
         for (int i = 0; i < kSteps; ++i)
@@ -260,7 +260,7 @@ TEST_CASE("materials: visible normals fill the projected area: the weak white fu
       }
 }
 
-TEST_CASE("materials: a perfect conductor loses only what shadowing takes") {
+TEST_CASE("materials: a perfect conductor loses energy only by shadowing") {
   for (const std::string distribution : {"ggx", "beckmann"})
     for (const double alpha : {0.01, 0.2}) {
       const BsdfPtr mirror = bsdfOf(
@@ -277,7 +277,7 @@ TEST_CASE("materials: a perfect conductor loses only what shadowing takes") {
     }
 }
 
-TEST_CASE("materials: rough transmittance tends to the smooth, and comes with its means") {
+TEST_CASE("materials: rough transmittance converges to the smooth one and matches sampled normals") {
   for (const double eta : {1.3, 1.5, 2.4}) {
     const RoughTransmittance t(Microfacet(Microfacet::Kind::ggx, 0.001, 0.001), eta);
     for (const float c : {0.05f, 0.3f, 0.7f, 1.0f})
@@ -285,7 +285,7 @@ TEST_CASE("materials: rough transmittance tends to the smooth, and comes with it
     CHECK(t.mean() == Approx(1.0 - fresnelDiffuse(eta)).margin(2e-3));
     CHECK(t.internalReflectance() == Approx(fresnelDiffuse(1.0 / eta)).margin(2e-3));
   }
-  // Against 10⁶ random normals.
+  // Compared with the mean over random normals.
   const Microfacet m(Microfacet::Kind::beckmann, 0.3, 0.3);
   const RoughTransmittance t(m, 1.5);
   Rng rng(16);
@@ -301,7 +301,7 @@ TEST_CASE("materials: rough transmittance tends to the smooth, and comes with it
   CHECK(t(static_cast<float>(wo.z())) == Approx(mean.value()).margin(4.0 * mean.error() + 2e-3));
 }
 
-TEST_CASE("materials: a dielectric keeps all energy and bends by Snell's law") {
+TEST_CASE("materials: a dielectric conserves energy and refracts by Snell's law") {
   const BsdfPtr glass = bsdfOf("dielectric", {{"int_ior", 1.5}, {"ext_ior", 1.0}});
   for (const double elevation : {0.0, 30.0, 60.0, 89.0, 120.0, 135.0, 179.0}) {
     const Vec3 wo = directionAt(elevation, 40.0);
@@ -339,7 +339,7 @@ TEST_CASE("materials: without transmittance a dielectric always reflects") {
   CHECK(s->weight.x() == Approx(fresnelDielectric(wo.z(), 1.5046 / 1.000277).reflectance));
 }
 
-TEST_CASE("materials: a thin slab reflects the sum of its inner reflections and lets the rest straight through") {
+TEST_CASE("materials: a thin slab reflects the sum of its internal reflections and transmits the rest straight") {
   const BsdfPtr pane = bsdfOf("thindielectric", {{"int_ior", 1.5}, {"ext_ior", 1.0}});
   for (const double elevation : {0.0, 60.0, 130.0}) {
     const Vec3 wo = directionAt(elevation, 40.0);
@@ -358,7 +358,7 @@ TEST_CASE("materials: a thin slab reflects the sum of its inner reflections and 
   }
 }
 
-TEST_CASE("materials: a mask shares light out between holes, delta and smooth parts of what it masks") {
+TEST_CASE("materials: a mask divides light between pass-through and the delta and smooth parts of its nested model") {
   const Rgb opacity(0.2f, 0.5f, 0.9f);
   const BsdfPtr nested = bsdfOf("plastic", {{"diffuse_reflectance", Rgb(0.8f, 0.4f, 0.2f)}});
   const BsdfPtr mask = bsdfOf("mask", {{"opacity", opacity}}, {nested});
@@ -389,7 +389,7 @@ TEST_CASE("materials: a mask shares light out between holes, delta and smooth pa
   CHECK(hole->deltaProbability(wo, kUv) == 1.0f);
 }
 
-TEST_CASE("materials: smooth plastic adds up: delta and diffuse parts against its albedo") {
+TEST_CASE("materials: the delta and diffuse parts of smooth plastic sum to its albedo") {
   const BsdfPtr plastic = bsdfOf("plastic", {{"diffuse_reflectance", grey(0.5f)}});
   const Vec3 wo = directionAt(65.0);
   Rng rng(17);

@@ -1,4 +1,4 @@
-// Parameters, registry, Fresnel, lobes' identity, sides and bumps.
+// Parameters, registry, Fresnel equations, keys of lobes, sides and bump maps.
 
 #include <catch2/catch.hpp>
 
@@ -14,7 +14,7 @@ namespace {
 
 using Catch::Matchers::Contains;
 
-/// Waves of height, for bumps: h = 0.05 sin(4u) + 0.03 cos(3v).
+/// A height field for bump maps: h = 0.05 sin(4u) + 0.03 cos(3v).
 class Waves final : public Texture {
  public:
   Rgb eval(const Vec2& uv) const override {
@@ -39,7 +39,7 @@ std::string messageOf(const std::string& type,
 
 }  // namespace
 
-TEST_CASE("materials: parameters have types, fallbacks and a memory of what was asked for") {
+TEST_CASE("materials: parameters check types and return fallbacks and record which were used") {
   Parameters p;
   p.set("number", 2.5, 40);
   p.set("flag", true);
@@ -64,7 +64,7 @@ TEST_CASE("materials: parameters have types, fallbacks and a memory of what was 
   CHECK_THROWS_AS(p.onlyTexture(), ParameterError);
 }
 
-TEST_CASE("materials: the registry knows its models and names them to who asks for another") {
+TEST_CASE("materials: the registry creates its models and lists them if the type is unknown") {
   const std::vector<std::string> known = knownBsdfs();
   CHECK(std::is_sorted(known.begin(), known.end()));
   for (const char* type : {"conductor", "dielectric", "diffuse", "plastic", "roughconductor", "roughplastic"})
@@ -74,7 +74,7 @@ TEST_CASE("materials: the registry knows its models and names them to who asks f
   for (const std::string& type : known) CHECK_THAT(message, Contains(type));
 }
 
-TEST_CASE("materials: wrong parameters are refused with what is known") {
+TEST_CASE("materials: invalid parameters are rejected with the valid alternatives") {
   CHECK_THAT(messageOf("roughconductor", {{"distribution", std::string("blinn")}}),
              Contains("distribution:") && Contains("blinn") && Contains("beckmann, ggx"));
   CHECK_THAT(messageOf("roughconductor", {{"alpha", -0.1}}), Contains("alpha:"));
@@ -91,7 +91,7 @@ TEST_CASE("materials: wrong parameters are refused with what is known") {
   CHECK_THAT(messageOf("bumpmap", {}, {bsdfOf("diffuse")}), Contains("texture"));
 }
 
-TEST_CASE("materials: every parameter of a model is used, so that leftovers are known") {
+TEST_CASE("materials: models use all of their parameters so that unknown ones are found") {
   const auto unused = [](const std::string& type, Parameters p) {
     makeBsdf(type, p);
     return p.unused();
@@ -115,7 +115,7 @@ TEST_CASE("materials: every parameter of a model is used, so that leftovers are 
   CHECK(unused("diffuse", parametersOf({{"reflectanse", 0.1}})) == std::vector<std::string>{"reflectanse"});
 }
 
-TEST_CASE("materials: negative indices of metals lose their sign, and the user is told") {
+TEST_CASE("materials: negative indices of metals are replaced by absolute values with a note") {
   const Parameters p =
       parametersOf({{"eta", Rgb(-0.05f, 4.1f, 4.7f)}, {"k", Rgb(-0.04f, 0.09f, 1.3f)}, {"alpha", 0.1}});
   const BsdfPtr metal = makeBsdf("roughconductor", p);
@@ -124,11 +124,11 @@ TEST_CASE("materials: negative indices of metals lose their sign, and the user i
   const Vec3 wo = directionAt(20.0), wi = directionAt(22.0, 180.0);
   CHECK((metal->eval(wo, wi, kUv) == plain->eval(wo, wi, kUv)).all());
   REQUIRE(p.notes().size() == 2);
-  CHECK_THAT(p.notes()[0], Contains("eta") && Contains("-0.05") && Contains("signs"));
+  CHECK_THAT(p.notes()[0], Contains("eta") && Contains("-0.05") && Contains("absolute"));
   CHECK_THAT(messageOf("conductor", {{"k", grey(std::nanf(""))}}), Contains("finite"));
 }
 
-TEST_CASE("materials: Fresnel against closed forms") {
+TEST_CASE("materials: Fresnel reflectances match closed forms") {
   CHECK(fresnelDielectric(1.0, 1.5).reflectance == Approx(0.04));
   CHECK(fresnelDielectric(0.0, 1.5).reflectance == Approx(1.0));
   CHECK(fresnelDielectric(0.5, 1.0 / 1.5).reflectance == 1.0);  // beyond the critical angle
@@ -142,7 +142,7 @@ TEST_CASE("materials: Fresnel against closed forms") {
           Approx(fresnelDielectric(c, 1.5).reflectance).margin(1e-5));
   CHECK(fresnelConductor(1.0f, grey(0.2f), grey(3.0f)).x() == Approx((0.64 + 9.0) / (1.44 + 9.0)));
   CHECK(fresnelConductor(0.3f, grey(0.0f), grey(1.0f)).x() == Approx(1.0));
-  // An index of zero, as fits to spectra have it, reflects all.
+  // An index of zero, which occurs in fits to spectra, reflects everything.
   for (const float c : {0.0f, 1e-4f, 0.5f, 1.0f})
     CHECK((fresnelConductor(c, grey(0.0f), grey(0.0f)) - 1.0f).abs().maxCoeff() < 1e-5f);
   CHECK(fresnelConductor(1.0f, grey(1.0f), grey(0.0f)).x() == Approx(0.0f).margin(1e-6));
@@ -156,7 +156,7 @@ TEST_CASE("materials: Fresnel against closed forms") {
   CHECK(fresnelDiffuse(1.0) == Approx(0.0).margin(1e-9));
 }
 
-TEST_CASE("materials: equal lobes have equal keys whatever their colour") {
+TEST_CASE("materials: equal lobes have equal keys regardless of colour") {
   const auto key = [](const BsdfPtr& bsdf) { return bsdf->lobes()[0]->key(); };
   const BsdfPtr a = bsdfOf("roughplastic", {{"alpha", 0.1}, {"int_ior", 1.5}, {"ext_ior", 1.0}});
   const BsdfPtr b = bsdfOf("roughplastic", {{"alpha", 0.1},
@@ -182,7 +182,7 @@ TEST_CASE("materials: equal lobes have equal keys whatever their colour") {
   CHECK(a->lobes()[0]->summary() == "beckmann α 0.1, dielectric 1.5");
 }
 
-TEST_CASE("materials: a lobe is the luminance of its material") {
+TEST_CASE("materials: the value of a lobe is the luminance of its material") {
   const BsdfPtr copper = bsdfOf("roughconductor", {{"alpha", 0.3}});
   const Vec3 wo = directionAt(40.0, 10.0);
   const Vec3 wi = directionAt(50.0, 170.0);
@@ -190,7 +190,7 @@ TEST_CASE("materials: a lobe is the luminance of its material") {
   CHECK(copper->eval(wo, wi, kUv).x() > copper->eval(wo, wi, kUv).z());
 }
 
-TEST_CASE("materials: rough plastic of no roughness to speak of has the diffuse part of the smooth") {
+TEST_CASE("materials: rough plastic of negligible roughness has the diffuse part of smooth plastic") {
   const BsdfPtr smooth = bsdfOf("plastic", {{"diffuse_reflectance", Rgb(0.2f, 0.5f, 0.8f)}});
   const BsdfPtr rough = bsdfOf("roughplastic", {{"diffuse_reflectance", Rgb(0.2f, 0.5f, 0.8f)}, {"alpha", 0.001}});
   const Vec3 wo = directionAt(30.0);
@@ -200,7 +200,7 @@ TEST_CASE("materials: rough plastic of no roughness to speak of has the diffuse 
   CHECK(((a - b).abs() / a).maxCoeff() < 0.005f);
 }
 
-TEST_CASE("materials: one-sided models are black from behind; twosided shows each side its own") {
+TEST_CASE("materials: one-sided models are black from behind and twosided has one model per side") {
   const Vec3 above = directionAt(30.0);
   const Vec3 below = directionAt(150.0);
   for (const char* type : {"diffuse", "plastic", "roughplastic", "roughconductor", "conductor"}) {
@@ -230,7 +230,7 @@ TEST_CASE("materials: one-sided models are black from behind; twosided shows eac
   CHECK(mirrored->wi.isApprox(Vec3(-below.x(), -below.y(), below.z())));
 }
 
-TEST_CASE("materials: bump normals are those of the displaced surface") {
+TEST_CASE("materials: bump mapping gives the normals of the displaced surface") {
   const BsdfPtr bump = bsdfOf("bumpmap", {{"", std::make_shared<Waves>()}, {"scale", 2.0}}, {bsdfOf("diffuse")});
   const Vec3 dpdu(2.0f, 0.3f, 0.0f);
   for (const float flip : {1.0f, -1.0f}) {
@@ -245,7 +245,7 @@ TEST_CASE("materials: bump normals are those of the displaced surface") {
       CHECK(n.z() > 0.0f);
     }
   }
-  // At any size of the surface, with bumps of that size.
+  // The normals do not change when surface and bumps are scaled together.
   for (const double size : {1e-12, 1e10}) {
     const BsdfPtr sized =
         bsdfOf("bumpmap", {{"", std::make_shared<Waves>()}, {"scale", 2.0 * size}}, {bsdfOf("diffuse")});
@@ -258,7 +258,7 @@ TEST_CASE("materials: bump normals are those of the displaced surface") {
   CHECK(flat->perturbedNormal(Vec3::UnitZ(), kUv, dpdu, Vec3::UnitY()).isApprox(Vec3::UnitZ()));
   CHECK(flat->perturbedNormal(Vec3::UnitZ(), kUv, Vec3::Zero(), Vec3::Zero()) == Vec3::UnitZ());
   CHECK(bsdfOf("diffuse")->perturbedNormal(Vec3::UnitZ(), kUv, dpdu, Vec3::UnitY()) == Vec3::UnitZ());
-  // A mask around a bump passes the bump on.
+  // A mask passes on the normals of its nested bump map.
   const BsdfPtr masked = bsdfOf("mask", {}, {bump});
   CHECK(masked->perturbedNormal(Vec3::UnitZ(), kUv, dpdu, Vec3::UnitY()) ==
         bump->perturbedNormal(Vec3::UnitZ(), kUv, dpdu, Vec3::UnitY()));

@@ -1,4 +1,4 @@
-// Measured materials: their files, the tables they are sampled by, and both models against analytic BRDFs.
+// Measured materials: their files, the tables used for sampling, and both models compared with analytic BRDFs.
 
 #include <catch2/catch.hpp>
 
@@ -29,7 +29,7 @@ BsdfPtr bsdfOfFile(const std::string& type, const std::filesystem::path& path) {
   return bsdfOf(type, {{"filename", path.string()}});
 }
 
-/// The error of the model, without the folder.
+/// The error message of the model for a file with these bytes.
 std::string faultOfFile(const std::string& type, const std::string& bytes) {
   const test::Folder folder;
   try {
@@ -42,7 +42,7 @@ std::string faultOfFile(const std::string& type, const std::string& bytes) {
   return "no error";
 }
 
-/// A coloured base under a glossy lobe.
+/// A coloured diffuse base plus a glossy lobe.
 Brdf analytic(double alphaU, double alphaV) {
   return [microfacet = Microfacet(Microfacet::Kind::ggx, alphaU, alphaV)](const Eigen::Vector3d& wo,
                                                                           const Eigen::Vector3d& wi) {
@@ -66,7 +66,7 @@ const MeasuredModels& models() {
   return made;
 }
 
-/// The largest error of the model's luminance, relative to the BRDF's, up to the elevation.
+/// The largest relative error of the model, compared with the BRDF, for directions up to the elevation.
 double worstError(const Bsdf& bsdf, const Brdf& brdf, double elevation) {
   Rng rng(5);
   double worst = 0.0;
@@ -91,7 +91,7 @@ std::vector<TestField> without(std::vector<TestField> fields, const std::string&
 
 }  // namespace
 
-TEST_CASE("materials: a tensor file gives its fields as they are asked for") {
+TEST_CASE("materials: a tensor file returns fields of the requested type and dimensions") {
   const test::Folder folder;
   const TensorFile file(write(
       folder, "t", tensorFile({floatField("a", {2, 3}, {1, 2, 3, 4, 5, 6}), {"b", 1, {2}, "hi"}, {"c", 5, {0}, ""}})));
@@ -106,7 +106,7 @@ TEST_CASE("materials: a tensor file gives its fields as they are asked for") {
   CHECK_THROWS_WITH(file.floats("d", 1), Contains("\"d\" is missing"));
 }
 
-TEST_CASE("materials: broken tensor files are refused, wherever they break") {
+TEST_CASE("materials: tensor files truncated at any byte or corrupted are rejected") {
   const std::string whole =
       tensorFile({floatField("first", {2, 2}, {1, 2, 3, 4}), floatField("second", {1, 3}, {5, 6, 7})});
   CHECK_THAT(faultOfFile("measured", whole), Contains("is missing"));
@@ -118,8 +118,8 @@ TEST_CASE("materials: broken tensor files are refused, wherever they break") {
   CHECK_THAT(faultOfFile("measured", "tensor file, or not?"), Contains("not a tensor file"));
   CHECK_THAT(faultOfFile("measured", std::string("tensor_file\0\2\0", 14)), Contains("version 2.0"));
   const TestField a = floatField("a", {1}, {1});
-  CHECK_THAT(faultOfFile("measured", tensorFile({a, a})), Contains("\"a\" is there twice"));
-  CHECK_THAT(faultOfFile("measured", tensorFile({{"a", 12, {1}, "1234"}})), Contains("\"a\"") && Contains("type, 12"));
+  CHECK_THAT(faultOfFile("measured", tensorFile({a, a})), Contains("\"a\" occurs twice"));
+  CHECK_THAT(faultOfFile("measured", tensorFile({{"a", 12, {1}, "1234"}})), Contains("\"a\"") && Contains("type 12"));
   for (const std::vector<std::uint64_t>& shape :
        {std::vector<std::uint64_t>{1ull << 63, 8}, {1ull << 32, 1ull << 32}, {~0ull}, {0, ~0ull}, {3}})
     CHECK_THAT(faultOfFile("measured", tensorFile({floatField("a", shape, {1, 2})})),
@@ -129,14 +129,14 @@ TEST_CASE("materials: broken tensor files are refused, wherever they break") {
   CHECK_THAT(faultOfFile("measured", late), Contains("\"a\" starts at byte"));
 }
 
-TEST_CASE("materials: measured files whose fields do not fit are refused with the field") {
+TEST_CASE("materials: measured files with inconsistent fields are rejected with the name of the field") {
   const std::vector<TestField> whole = isotropicFields();
   const auto fault = [&](const TestField& other) { return faultOfFile("measured", tensorFile(changed(whole, other))); };
   CHECK(faultOfFile("measured", tensorFile(whole)) == "no error");
   for (const char* name : {"phi_i", "theta_i", "sigma", "ndf", "vndf", "luminance", "rgb", "jacobian"})
     CHECK_THAT(faultOfFile("measured", tensorFile(without(whole, name))),
                Contains(std::string("\"") + name + "\" is missing"));
-  CHECK_THAT(fault(floatField("theta_i", {2}, {0.5f, 0.5f})), Contains("\"theta_i\" does not ascend"));
+  CHECK_THAT(fault(floatField("theta_i", {2}, {0.5f, 0.5f})), Contains("\"theta_i\" is not strictly ascending"));
   CHECK_THAT(fault(floatField("theta_i", {2}, {0, 90})), Contains("\"theta_i\" spans"));
   CHECK_THAT(fault(floatField("theta_i", {2}, {0, 1})), Contains("1×19 tables") && Contains("1×2"));
   CHECK_THAT(fault(floatField("phi_i", {3}, {0, 1, 2})), Contains("tables"));
@@ -150,7 +150,7 @@ TEST_CASE("materials: measured files whose fields do not fit are refused with th
   CHECK_THAT(faultOfFile("measured", tensorFile(spectral)), Contains("spectral") && Contains("rgb variant"));
 }
 
-TEST_CASE("materials: a bilinear warp inverts what it samples, by its density") {
+TEST_CASE("materials: a bilinear warp inverts its samples and they match its density") {
   Rng rng(21);
   const TableSize size{7, 5};
   std::vector<float> values(3 * size.nodes());
@@ -178,14 +178,14 @@ TEST_CASE("materials: a bilinear warp inverts what it samples, by its density") 
   CHECK(warp.density({0.2, 0.7}, nodes.at(0.0, 2.0)) == Approx(1.0));
 }
 
-TEST_CASE("materials: measured models give the BRDF that their files were made from") {
+TEST_CASE("materials: measured models reproduce the BRDF from which their files were made") {
   CHECK(worstError(*models().measured, models().brdf, 70.0) < 0.03);
   CHECK(worstError(*models().merl, models().brdf, 70.0) < 0.03);
   CHECK(models().measured->lobes()[0]->kind() == LobeKind::isotropic);
   CHECK(models().measured->lobes()[0]->summary() == "m_rgb");
 }
 
-TEST_CASE("materials: measured models are anisotropic, and use the symmetry of their azimuths") {
+TEST_CASE("materials: measured models support anisotropy and symmetry of the measured azimuths") {
   const test::Folder folder;
   const Brdf brdf = analytic(0.35, 0.6);
   for (const int symmetry : {1, 2, 4}) {
@@ -208,7 +208,7 @@ TEST_CASE("materials: measured models are anisotropic, and use the symmetry of t
   }
 }
 
-TEST_CASE("materials: measured models sample their density") {
+TEST_CASE("materials: samples of measured models match their density") {
   std::uint64_t seed = 40;
   for (const BsdfPtr& bsdf : {models().measured, models().merl})
     for (const double elevation : {0.0, 57.0, 89.9}) {
@@ -224,7 +224,7 @@ TEST_CASE("materials: measured models sample their density") {
     }
 }
 
-TEST_CASE("materials: measured models are finite everywhere, and sample what they evaluate") {
+TEST_CASE("materials: measured models are finite everywhere and their samples match eval and pdf") {
   Rng rng(51);
   for (const BsdfPtr& bsdf : {models().measured, models().merl}) {
     int bad = 0;
@@ -257,7 +257,7 @@ TEST_CASE("materials: a MERL material is reciprocal") {
   CHECK(worst < 1e-5);
 }
 
-TEST_CASE("materials: broken MERL files are refused, and what was not measured is black") {
+TEST_CASE("materials: invalid MERL files are rejected and unmeasured values are black") {
   CHECK_THAT(faultOfFile("merl", ""), Contains("not a MERL file"));
   CHECK_THAT(faultOfFile("merl", bytesOf(std::vector<std::int32_t>{90, -90, 180})), Contains("90×-90×180"));
   CHECK_THAT(faultOfFile("merl", bytesOf(std::vector<std::int32_t>{90, 90, 180, 1})), Contains("16"));
@@ -269,7 +269,7 @@ TEST_CASE("materials: broken MERL files are refused, and what was not measured i
   CHECK(black->sample(directionAt(20.0), kUv, 0.5f, Vec2(0.6f, 0.4f)).has_value());
 }
 
-TEST_CASE("materials: a measured lobe is known by its file's content, not by its path") {
+TEST_CASE("materials: a measured lobe is identified by the content of its file and not by the path") {
   const test::Folder folder;
   std::vector<TestField> fields = isotropicFields();
   const BsdfPtr a = bsdfOfFile("measured", write(folder, "a.bsdf", tensorFile(fields)));
@@ -281,7 +281,7 @@ TEST_CASE("materials: a measured lobe is known by its file's content, not by its
   CHECK(a->lobes()[0]->key() != c->lobes()[0]->key());
 }
 
-TEST_CASE("materials: real measurements keep energy, and their samplers follow them") {
+TEST_CASE("materials: real measurements conserve energy and are sampled with low variance") {
   const char* folder = std::getenv("LOBE_DATA");
   if (!folder) {
     WARN("LOBE_DATA is not set: skipped");
@@ -290,8 +290,7 @@ TEST_CASE("materials: real measurements keep energy, and their samplers follow t
   struct Real {
     const char* type;
     const char* name;
-    double
-        mostReflected;  ///< the vinyl film's measurement gives back more than it got where it is seen at grazing angles
+    double mostReflected;  ///< the measurement of the vinyl film creates energy at grazing angles
   };
   for (const Real& real :
        {Real{"measured", "paper_white_rgb.bsdf", 1.0}, Real{"measured", "cc_ibiza_sunset_rgb.bsdf", 1.0},

@@ -1,4 +1,4 @@
-// Models made of other models, pass-through and diffuse transmission, against what they are made of.
+// Models that contain other models, pass-through and diffuse transmission, compared with their parts.
 
 #include <catch2/catch.hpp>
 
@@ -27,7 +27,7 @@ class Halves final : public Texture {
   Rgb left_, right_;
 };
 
-/// A height of u, for bumps.
+/// A height field that is equal to u, for bump maps.
 class Ramp final : public Texture {
  public:
   Rgb eval(const Vec2& uv) const override { return grey(uv.x()); }
@@ -87,7 +87,7 @@ void checkSame(const Bsdf& a, const Bsdf& b, const Vec2& uv) {
 
 }  // namespace
 
-TEST_CASE("materials: null passes everything straight through") {
+TEST_CASE("materials: null passes all light straight through") {
   const BsdfPtr none = bsdfOf("null");
   for (const Vec3& wo : {kAbove, kBelow}) {
     const auto s = none->sampleDelta(wo, kUv, 0.7f);
@@ -102,7 +102,7 @@ TEST_CASE("materials: null passes everything straight through") {
   CHECK(none->transmits());
 }
 
-TEST_CASE("materials: a diffuse transmitter gives its transmittance to the other side, whichever that is") {
+TEST_CASE("materials: a diffuse transmitter scatters its transmittance to the opposite side for both sides") {
   const Rgb transmittance(0.2f, 0.5f, 0.8f);
   const BsdfPtr paper = bsdfOf("difftrans", {{"transmittance", transmittance}});
   CHECK(paper->transmits());
@@ -112,7 +112,7 @@ TEST_CASE("materials: a diffuse transmitter gives its transmittance to the other
     CHECK(paper->pdf(wo, wo, kUv) == 0.0f);
     CHECK(paper->mixture(wo, kUv).undescribedFraction == 1.0f);
     CHECK(paper->mixture(wo, kUv).constant == 0.0f);
-    // Sampled by the cosine, every sample carries the albedo.
+    // With cosine-weighted sampling the weight of every sample is the albedo.
     for (const float u : {0.01f, 0.5f, 0.99f}) {
       const auto s = paper->sample(wo, kUv, 0.5f, Vec2(u, 0.3f));
       REQUIRE(s);
@@ -122,7 +122,7 @@ TEST_CASE("materials: a diffuse transmitter gives its transmittance to the other
   }
 }
 
-TEST_CASE("materials: a blend of weight 0 or 1 is one of its parts") {
+TEST_CASE("materials: a blend with weight 0 or 1 equals one of its parts") {
   const BsdfPtr plastic = bsdfOf("plastic", {{"diffuse_reflectance", Rgb(0.8f, 0.4f, 0.2f)}});
   const BsdfPtr glass = bsdfOf("dielectric");
   const BsdfPtr masked = bsdfOf("mask", {{"opacity", 0.3}}, {bsdfOf("roughplastic")});
@@ -137,7 +137,7 @@ TEST_CASE("materials: a blend of weight 0 or 1 is one of its parts") {
   }
 }
 
-TEST_CASE("materials: a blend adds its parts up by weight") {
+TEST_CASE("materials: a blend is the weighted sum of its parts") {
   const BsdfPtr metal = metalOf(0.2, 0.5f);
   const BsdfPtr plastic = bsdfOf("roughplastic", {{"alpha", 0.3}, {"diffuse_reflectance", Rgb(0.8f, 0.4f, 0.2f)}});
   const BsdfPtr blend = blendOf(0.25, metal, plastic);
@@ -160,7 +160,7 @@ TEST_CASE("materials: a blend adds its parts up by weight") {
   CHECK(blendOf(0.5, metal, bsdfOf("null"))->transmits());
 }
 
-TEST_CASE("materials: delta parts of a blend keep their energy") {
+TEST_CASE("materials: delta parts of a mixturebsdf conserve energy") {
   const BsdfPtr mirror = bsdfOf("conductor", {{"material", std::string("none")}});
   const BsdfPtr glass = bsdfOf("thindielectric");
   const BsdfPtr blend = mixtureOf("0.5 0.25 0.15", {mirror, glass, bsdfOf("diffuse")});
@@ -180,7 +180,7 @@ TEST_CASE("materials: delta parts of a blend keep their energy") {
   CHECK(passed.x() > 0.2f);
 }
 
-TEST_CASE("materials: of many lobes a mixture names the strongest") {
+TEST_CASE("materials: of many lobes the mixture keeps those with the largest tints") {
   const BsdfPtr metals[] = {metalOf(0.1), metalOf(0.2, 0.1f), metalOf(0.3), metalOf(0.4), metalOf(0.5), metalOf(0.6)};
   const BsdfPtr bsdf =
       mixtureOf("0.15,0.15,0.15,0.15,0.15,0.05", {metals[0], metals[1], metals[2], metals[3], metals[4], metals[5]});
@@ -194,7 +194,7 @@ TEST_CASE("materials: of many lobes a mixture names the strongest") {
   }
 }
 
-TEST_CASE("materials: the share of light through a blend is by albedo") {
+TEST_CASE("materials: the undescribed fraction of a blend is weighted by albedo") {
   const BsdfPtr blend =
       blendOf(0.25, bsdfOf("diffuse", {{"reflectance", 0.2}}), bsdfOf("difftrans", {{"transmittance", 0.6}}));
   CHECK(blend->mixture(kAbove, kUv).undescribedFraction == Approx(0.5f));
@@ -202,13 +202,13 @@ TEST_CASE("materials: the share of light through a blend is by albedo") {
   CHECK(blend->mixture(kBelow, kUv).undescribedFraction == Approx(1.0f));
 }
 
-TEST_CASE("materials: weights above 1 in sum are scaled down to it, others are left") {
+TEST_CASE("materials: mixture weights are scaled to a sum of 1 only if their sum exceeds 1") {
   const BsdfPtr white = bsdfOf("diffuse", {{"reflectance", 1.0}});
   CHECK(mixtureOf("3, 1", {white, bsdfOf("conductor")})->mixture(kAbove, kUv).constant == Approx(0.75f));
   CHECK(mixtureOf("0.3;0.1", {white, white})->albedo(kAbove, kUv).x() == Approx(0.4f));
 }
 
-TEST_CASE("materials: what is wrong with nested models is told") {
+TEST_CASE("materials: errors in nested models are reported") {
   using Catch::Matchers::Contains;
   const BsdfPtr diffuse = bsdfOf("diffuse");
   CHECK_THAT(messageOf("blendbsdf", {{"weight", 0.5}}, {diffuse}), Contains("two nested bsdfs") && Contains("1"));
@@ -223,7 +223,7 @@ TEST_CASE("materials: what is wrong with nested models is told") {
   CHECK_THAT(messageOf("twosided", {}, {bsdfOf("mask", {}, {diffuse})}), Contains("mask > twosided"));
 }
 
-TEST_CASE("materials: a normal map turns the normal in the frame of the tangent along u") {
+TEST_CASE("materials: a normal map perturbs the normal in the frame of the tangent along u") {
   const auto mapped = [](const Rgb& colour, const Vec3& dpdu, const BsdfPtr& nested) {
     return bsdfOf("normalmap", {{"normalmap", constantTexture(colour)}}, {nested})
         ->perturbedNormal(Vec3::UnitZ(), kUv, dpdu, Vec3::UnitY());
@@ -231,7 +231,7 @@ TEST_CASE("materials: a normal map turns the normal in the frame of the tangent 
   const BsdfPtr diffuse = bsdfOf("diffuse");
   const Vec3 along = Vec3(0.0f, 2.0f, 0.0f);
   CHECK(mapped(Rgb(0.5f, 0.5f, 1.0f), along, diffuse).isApprox(Vec3::UnitZ()));
-  // (0.6, 0, 0.8) leans along u, which is local y here; (0, 0.6, 0.8) then leans along −x.
+  // (0.6, 0, 0.8) is tilted along u, which is local y here; (0, 0.6, 0.8) is then tilted along −x.
   CHECK(mapped(Rgb(0.8f, 0.5f, 0.9f), along, diffuse).isApprox(Vec3(0.0f, 0.6f, 0.8f), 1e-5f));
   CHECK(mapped(Rgb(0.5f, 0.8f, 0.9f), along, diffuse).isApprox(Vec3(-0.6f, 0.0f, 0.8f), 1e-5f));
   CHECK(mapped(Rgb(0.65f, 0.5f, 0.7f), along, diffuse).isApprox(Vec3(0.0f, 0.6f, 0.8f), 1e-5f));  // any length
@@ -244,7 +244,7 @@ TEST_CASE("materials: a normal map turns the normal in the frame of the tangent 
   CHECK(twice.isApprox(Vec3(0.96f, 0.0f, 0.28f), 1e-5f));
 }
 
-TEST_CASE("materials: mapped normals that look away from the viewer are turned round where that is asked for") {
+TEST_CASE("materials: mapped normals that face away from the viewer are flipped if the option is set") {
   const Rgb leaning(0.8f, 0.5f, 0.9f);  // (0.6, 0, 0.8)
   const auto normal = [&](bool flips, const Vec3& wo) {
     const BsdfPtr map =
@@ -256,7 +256,7 @@ TEST_CASE("materials: mapped normals that look away from the viewer are turned r
   CHECK(normal(true, facing).isApprox(Vec3(0.6f, 0.0f, 0.8f), 1e-5f));
   CHECK(normal(true, averted).isApprox(Vec3(-0.6f, 0.0f, 0.8f), 1e-5f));
   CHECK(normal(false, averted).isApprox(Vec3(0.6f, 0.0f, 0.8f), 1e-5f));
-  // From below, the side that counts is the other one.
+  // The result is the same for −wo.
   CHECK(normal(true, -facing).isApprox(Vec3(0.6f, 0.0f, 0.8f), 1e-5f));
   CHECK(normal(true, -averted).isApprox(Vec3(-0.6f, 0.0f, 0.8f), 1e-5f));
   const auto slope = std::make_shared<Ramp>();
@@ -267,16 +267,16 @@ TEST_CASE("materials: mapped normals that look away from the viewer are turned r
   CHECK(bump->perturbedNormal(facing, kUv, Vec3::UnitX(), Vec3::UnitY()).isApprox(Vec3(-n.x(), 0.0f, n.z()), 1e-3f));
 }
 
-TEST_CASE("materials: the back of a two-sided map is the mirror image of its front") {
+TEST_CASE("materials: the normal map on the back of twosided is the mirror image of its front") {
   const BsdfPtr map = bsdfOf("normalmap", {{"", constantTexture(Rgb(0.8f, 0.5f, 0.9f))}}, {bsdfOf("diffuse")});
   const BsdfPtr both = bsdfOf("twosided", {}, {map});
   const auto normal = [&](const Vec3& wo) { return both->perturbedNormal(wo, kUv, Vec3::UnitX(), Vec3::UnitY()); };
   CHECK(normal(kAbove).isApprox(Vec3(0.6f, 0.0f, 0.8f), 1e-5f));
-  // The axis (0.6, 0, −0.8) on the front side.
+  // The mirror image of the normal of the front, (0.6, 0, −0.8), as a line.
   CHECK(normal(kBelow).isApprox(Vec3(-0.6f, 0.0f, 0.8f), 1e-5f));
 }
 
-TEST_CASE("materials: shadowing at the terminator is asked for through all models") {
+TEST_CASE("materials: models pass on the terminator shadowing of their nested models") {
   const auto mapped = [](bool shadows) {
     return bsdfOf("normalmap", {{"", constantTexture(Rgb(0.8f, 0.5f, 0.9f))}, {"use_shadowing_function", shadows}},
                   {bsdfOf("diffuse")});
@@ -295,7 +295,7 @@ TEST_CASE("materials: shadowing at the terminator is asked for through all model
   CHECK_FALSE(bsdfOf("coating", {}, {bsdfOf("diffuse")})->mapsNormals());
 }
 
-TEST_CASE("materials: normals mapped in a blend are averaged by weight") {
+TEST_CASE("materials: mapped normals in a blend are averaged by weight") {
   const BsdfPtr flat = bsdfOf("diffuse");
   const BsdfPtr leaning = bsdfOf("normalmap", {{"", constantTexture(Rgb(0.8f, 0.5f, 0.9f))}}, {flat});
   const auto normal = [](const BsdfPtr& bsdf) {

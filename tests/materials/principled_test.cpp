@@ -1,4 +1,4 @@
-// The principled model, part by part: each alone against a closed form or another model.
+// The parts of the principled model, each compared with a closed form or another model.
 
 #include <catch2/catch.hpp>
 
@@ -14,7 +14,7 @@ BsdfPtr principled(Values values) {
   return bsdfOf("principled", values);
 }
 
-/// Without interface: what is left is diffuse.
+/// Without the specular interface: only the diffuse part is left.
 BsdfPtr withoutInterface(double roughness, double flatness, double reflectance, double sheen) {
   return principled({{"specular", 0.0},
                      {"roughness", roughness},
@@ -43,7 +43,7 @@ TEST_CASE("materials: a principled metal is a GGX conductor with Schlick's refle
     const Rgb expected = white->eval(wo, wi, kUv) * (base + (1.0f - base) * weight);
     CHECK((metal->eval(wo, wi, kUv) - expected).abs().maxCoeff() <= 1e-4f * (1e-3f + expected.maxCoeff()));
   }
-  // Anisotropy of 0.8 makes an aspect of √0.28.
+  // An anisotropy of 0.8 means an aspect ratio of √0.28.
   const double aspect = std::sqrt(1.0 - 0.9 * 0.8);
   const BsdfPtr brushed =
       principled({{"metallic", 1.0}, {"roughness", 0.6}, {"base_color", 1.0}, {"anisotropic", 0.8}});
@@ -57,25 +57,26 @@ TEST_CASE("materials: a principled metal is a GGX conductor with Schlick's refle
   CHECK(brushed->lobes()[0]->kind() == LobeKind::anisotropic);
 }
 
-TEST_CASE("materials: the principled interface is a dielectric of the index that specular stands for") {
-  // specular 0.5 is an index of 1.5, which reflects 0.04; black below, roughness 1, seen along the normal.
+TEST_CASE("materials: the principled interface is a dielectric of the index implied by specular") {
+  // specular 0.5 implies an index of 1.5 and a reflectance of 0.04. Black base, roughness 1, normal incidence.
   const Vec3 up = Vec3::UnitZ();
-  const double density = 0.25 / std::numbers::pi;  // D / 4 of α = 1
+  const double density = 0.25 / std::numbers::pi;  // D / 4 for α = 1
   for (const BsdfPtr& bsdf : {principled({{"base_color", 0.0}, {"roughness", 1.0}}),
                               principled({{"base_color", 0.0}, {"roughness", 1.0}, {"eta", 1.5}})})
     CHECK(bsdf->eval(up, up, kUv).x() == Approx(0.04 * density).epsilon(1e-4));
-  // Fully tinted, the reflectance takes the hue: red at luminance 1.
+  // With full tint the reflectance has the hue of the base colour: red at luminance 1.
   const BsdfPtr red =
       principled({{"base_color", Rgb(0.5f, 0.0f, 0.0f)}, {"roughness", 1.0}, {"spec_tint", 1.0}, {"spec_trans", 0.0}});
   CHECK(red->eval(up, up, kUv).x() - 0.5 * kInvPi == Approx(0.04 / 0.212671 * density).epsilon(1e-3));
   CHECK(red->eval(up, up, kUv).z() == Approx(0.0).margin(1e-7));
 }
 
-TEST_CASE("materials: principled diffuse, flat and sheen by hand") {
+TEST_CASE("materials: the diffuse and sheen terms of principled match closed forms") {
   const Vec3 up = Vec3::UnitZ();
   CHECK(withoutInterface(0.7, 0.0, 0.6, 0.0)->eval(up, up, kUv).x() == Approx(0.6 * kInvPi));
   CHECK(withoutInterface(0.7, 1.0, 0.6, 0.0)->eval(up, up, kUv).x() == Approx(0.625 * 0.6 * kInvPi));
-  // Both at 60 degrees and opposite: Schlick's weights are 1/32, the half angle's cosine is 1/2.
+  // Both directions at 60 degrees, opposite: Schlick's weights are 1/32, the cosine of half the angle between them is
+  // 1/2.
   const Vec3 wo = directionAt(60.0, 0.0);
   const Vec3 wi = directionAt(60.0, 180.0);
   const double w = 1.0 / 32.0;
@@ -90,7 +91,7 @@ TEST_CASE("materials: principled diffuse, flat and sheen by hand") {
   CHECK(withoutInterface(0.7, 0.0, 0.0, 0.5)->eval(wo, wi, kUv).x() == Approx(0.5 * w));
 }
 
-TEST_CASE("materials: the clear coat by hand") {
+TEST_CASE("materials: the clear coat of principled matches the closed form") {
   const BsdfPtr coated = principled({{"base_color", 0.0}, {"specular", 0.0}, {"clearcoat", 0.8}});
   const double a2 = 0.01;
   const auto density = [&](double cosine2) {
@@ -109,7 +110,7 @@ TEST_CASE("materials: the clear coat by hand") {
   CHECK(coated->mixture(up, kUv).glossy[1].tint == Approx(0.2f));
 }
 
-TEST_CASE("materials: principled glass keeps its energy, and its two ways differ by the index squared") {
+TEST_CASE("materials: principled glass conserves energy and is reciprocal up to the squared index") {
   const BsdfPtr glass = principled({{"base_color", 1.0}, {"spec_trans", 1.0}, {"eta", 1.5}, {"roughness", 0.15}});
   CHECK(glass->transmits());
   Rng rng(52);
@@ -151,7 +152,7 @@ TEST_CASE("materials: an opaque principled surface is black from behind") {
   CHECK(bsdf->mixture(-below, kUv).undescribedFraction == 0.0f);
 }
 
-TEST_CASE("materials: all of principled is finite at the edges of its parameters") {
+TEST_CASE("materials: principled is finite at the limits of its parameters") {
   Rng rng(53);
   const float edges[] = {0.0f, 1e-30f, -1e-30f, 1e-6f, -1e-6f, 1.0f, -1.0f};
   for (const double roughness : {0.0, 1.0})
@@ -194,7 +195,7 @@ TEST_CASE("materials: principled surfaces of any colour share a lobe") {
   CHECK(key({{"roughness", 0.4}}) != key({}));
 }
 
-TEST_CASE("materials: what is wrong with a principled surface is told") {
+TEST_CASE("materials: errors in principled are reported") {
   using Catch::Matchers::Contains;
   const auto message = [](Values values) {
     try {

@@ -1,4 +1,4 @@
-// The principled model of thin surfaces against its parts.
+// The principled model of thin surfaces compared with its parts.
 
 #include <catch2/catch.hpp>
 
@@ -16,7 +16,7 @@ Vec3 flipped(const Vec3& w) {
 
 }  // namespace
 
-TEST_CASE("materials: principledthin without transmission is the diffuse part of principled, on both sides") {
+TEST_CASE("materials: principledthin without transmission equals the diffuse part of principled on both sides") {
   const std::initializer_list<std::pair<std::string, ParameterValue>> shared = {{"base_color", Rgb(0.8f, 0.5f, 0.2f)},
                                                                                 {"roughness", 0.7},
                                                                                 {"flatness", 0.4},
@@ -38,7 +38,7 @@ TEST_CASE("materials: principledthin without transmission is the diffuse part of
   }
 }
 
-TEST_CASE("materials: principledthin splits diffuse light by half of diff_trans") {
+TEST_CASE("materials: principledthin transmits half of diff_trans of its diffuse light") {
   const Vec3 wo = directionAt(30.0);
   const Vec3 below = directionAt(120.0, 50.0);
   const auto thin = [](double transmission) {
@@ -53,7 +53,7 @@ TEST_CASE("materials: principledthin splits diffuse light by half of diff_trans"
   CHECK(thin(2.0)->mixture(wo, kUv).undescribedFraction == 1.0f);
 }
 
-TEST_CASE("materials: the interface of principledthin by hand") {
+TEST_CASE("materials: the interface of principledthin matches microfacet reflection and transmission") {
   constexpr double kEta = 1.4, kRoughness = 0.6;
   const BsdfPtr thin =
       bsdfOf("principledthin",
@@ -71,12 +71,12 @@ TEST_CASE("materials: the interface of principledthin by hand") {
     const double through = transmitting.reflection(wo, wi) * (1.0 - fresnel);
     CHECK(thin->eval(wo, flipped(wi), kUv).isApprox(Rgb(0.9f, 0.6f, 0.3f) * static_cast<float>(through), 1e-4f));
   }
-  // A facet does not send light through on the side where it came from.
+  // A facet does not transmit light to the side from which it came.
   const Vec3 grazing = directionAt(88.0, 10.0);
   CHECK(thin->eval(grazing, flipped(directionAt(89.0, 12.0)), kUv).maxCoeff() == 0.0f);
 }
 
-TEST_CASE("materials: a clear thin sheet loses nothing") {
+TEST_CASE("materials: a clear thin sheet conserves energy") {
   const BsdfPtr sheet =
       bsdfOf("principledthin", {{"base_color", 1.0}, {"roughness", 0.15}, {"spec_trans", 1.0}, {"eta", 1.5}});
   const Vec3 wo = directionAt(30.0);
@@ -92,7 +92,7 @@ TEST_CASE("materials: a clear thin sheet loses nothing") {
   CHECK(sheet->lobes().size() == 1);
 }
 
-TEST_CASE("materials: what is wrong with principledthin is told") {
+TEST_CASE("materials: errors in principledthin are reported") {
   const auto messageOf = [](const std::string& name, double value) -> std::string {
     try {
       bsdfOf("principledthin", {{name, value}});

@@ -1,4 +1,4 @@
-// The rough dielectric from both sides: sampler against density, energy, reciprocity, limits.
+// The rough dielectric from both sides: χ² tests, energy, reciprocity, limits.
 
 #include <catch2/catch.hpp>
 
@@ -31,7 +31,7 @@ Chi2Result chi2Of(const Bsdf& drawn, const Bsdf& claimed, const Vec3& wo, std::u
   return chi2Sphere(sampler, [&](const Vec3& wi) { return claimed.pdf(wo, wi, kUv); });
 }
 
-/// The share of energy that comes back, and that goes through.
+/// Fractions of energy that are reflected and refracted, and their sum.
 struct Energy {
   Mean reflected, refracted, total;
 };
@@ -53,7 +53,7 @@ Energy energyOf(const Bsdf& bsdf, const Vec3& wo, int samples) {
 
 }  // namespace
 
-TEST_CASE("materials: a rough dielectric samples its density over the whole sphere from both sides") {
+TEST_CASE("materials: samples of a rough dielectric match its density over the sphere from both sides") {
   struct Case {
     const char* distribution;
     double u, v, ior;
@@ -74,7 +74,7 @@ TEST_CASE("materials: a rough dielectric samples its density over the whole sphe
   }
 }
 
-TEST_CASE("materials: the chi-square test fails a rough dielectric of slightly other index or tint") {
+TEST_CASE("materials: the chi-square test rejects a rough dielectric of slightly different index or tint") {
   const BsdfPtr right = roughGlass("ggx", 0.2, 0.2, 1.5);
   for (const double elevation : {40.0, 150.0}) {
     const Vec3 wo = directionAt(elevation, 10.0);
@@ -83,7 +83,7 @@ TEST_CASE("materials: the chi-square test fails a rough dielectric of slightly o
   }
 }
 
-TEST_CASE("materials: a lossless rough dielectric keeps what single scattering keeps, and knows where it goes") {
+TEST_CASE("materials: a lossless rough dielectric loses only multiple scattering and its mixture matches its energy") {
   for (const std::string distribution : {"ggx", "beckmann"})
     for (const double alpha : {0.001, 0.1, 0.5})
       for (const double elevation : {0.0, 50.0, 80.0, 95.0, 130.0, 140.0, 180.0}) {
@@ -94,7 +94,7 @@ TEST_CASE("materials: a lossless rough dielectric keeps what single scattering k
         CHECK(energy.total.value() <= 1.0 + 1e-5);
         CHECK(energy.total.value() > (alpha < 0.01 ? 0.995 : alpha < 0.2 ? 0.84 : 0.58));
         const LobeMixture mixture = glass->mixture(wo, kUv);
-        // A table for guidance: from within, total reflection is a kink that it rounds off.
+        // The mixture uses a table, which smooths the kink of total internal reflection.
         CHECK(mixture.undescribedFraction ==
               Approx(energy.refracted.value()).margin(4.0 * energy.refracted.error() + 0.06));
         Mean modelled;
@@ -131,11 +131,11 @@ TEST_CASE("materials: a rough dielectric is reciprocal once radiance is divided 
       }
       INFO(distribution << " " << alpha);
       CHECK(refracted > 1000);
-      CHECK(worst < 2e-3);  // by the rounding of wi inside Fresnel's kink at the critical angle
+      CHECK(worst < 2e-3);  // due to the rounding of wi near the kink at the critical angle
     }
 }
 
-TEST_CASE("materials: with no roughness to speak of a rough dielectric is a smooth one") {
+TEST_CASE("materials: a rough dielectric of negligible roughness matches the smooth one") {
   const Rgb red(0.9f, 0.4f, 0.2f), blue(0.1f, 0.5f, 0.8f);
   const BsdfPtr rough = roughGlass("ggx", 0.0005, 0.0005, 1.5, red, blue);
   const BsdfPtr smooth =
@@ -158,7 +158,7 @@ TEST_CASE("materials: with no roughness to speak of a rough dielectric is a smoo
   }
 }
 
-TEST_CASE("materials: rough dielectrics without effect, or seen edge on, are black and not undefined") {
+TEST_CASE("materials: rough dielectrics are defined for black tints and directions in the surface plane") {
   CHECK_THROWS_AS(roughGlass("ggx", 0.1, 0.1, 1.0), ParameterError);
   const BsdfPtr black = roughGlass("ggx", 0.1, 0.1, 1.5, grey(0.0f), grey(0.0f));
   const BsdfPtr glass = roughGlass("ggx", 0.1, 0.1, 1.5);
@@ -173,9 +173,9 @@ TEST_CASE("materials: rough dielectrics without effect, or seen edge on, are bla
   }
   CHECK_FALSE(glass->sample(Vec3::UnitX(), kUv, 0.5f, Vec2(0.5f, 0.5f)));
   CHECK(glass->mixture(Vec3::UnitX(), kUv).glossyCount == 0);
-  // No normal bends light along the surface's other side back up to where it came from.
+  // No facet refracts these directions into each other: they are on the same side in azimuth.
   CHECK(glass->eval(directionAt(60.0), directionAt(91.0, 0.0), kUv).maxCoeff() == 0.0f);
-  // Past the critical angle all is reflected, and only one lobe takes part on each side.
+  // Beyond the critical angle all light is reflected. Each side has its own lobe.
   CHECK(roughGlass("ggx", 0.001, 0.001, 1.5)->mixture(directionAt(125.0), kUv).undescribedFraction < 0.01f);
   CHECK(glass->mixture(below, kUv).glossy[0].lobe == 1);
   CHECK(glass->lobes()[0]->key() != glass->lobes()[1]->key());

@@ -1,4 +1,4 @@
-// Textured roughness: the exact distribution where light scatters, lobes at shared levels for the fit.
+// Textured roughness: exact distributions for scattering, lobes at shared roughness levels for the fit.
 
 #include <catch2/catch.hpp>
 
@@ -11,7 +11,7 @@
 namespace lobe {
 namespace {
 
-/// Along u, one pixel each, without interpolation: pixel i is hit at u = (i + ½) / count.
+/// A texture of one row with one pixel per value, without interpolation: pixel i is at u = (i + ½) / count.
 TexturePtr steps(std::initializer_list<float> values) {
   auto image = std::make_shared<Image>(static_cast<int>(values.size()), 1);
   std::transform(values.begin(), values.end(), image->pixels.begin(), grey);
@@ -28,7 +28,7 @@ constexpr const char* kModels[] = {"roughconductor", "roughplastic", "roughdiele
 
 }  // namespace
 
-TEST_CASE("materials: roughness levels are half octaves up to one") {
+TEST_CASE("materials: roughness levels are half an octave apart and end at one") {
   CHECK(roughnessOfLevel(kRoughnessLevels - 1) == 1.0);
   CHECK(roughnessOfLevel(0) == 1.0 / 128.0);
   CHECK(roughnessOfLevel(13) == Approx(std::sqrt(0.5)).epsilon(1e-15));
@@ -37,7 +37,7 @@ TEST_CASE("materials: roughness levels are half octaves up to one") {
   CHECK(levelOfRoughness(3.0) == kRoughnessLevels - 1);
 }
 
-TEST_CASE("materials: textures know the bounds of their luminance") {
+TEST_CASE("materials: textures return the bounds of their luminance") {
   const TextureRange bitmap = steps({0.3f, 0.1f, 0.9f, std::nanf("")})->range();
   CHECK(bitmap.smallest == Approx(0.1f));
   CHECK(bitmap.largest == Approx(0.9f));
@@ -48,7 +48,7 @@ TEST_CASE("materials: textures know the bounds of their luminance") {
   CHECK(nothing.smallest == nothing.largest);
 }
 
-TEST_CASE("materials: textured roughness scatters as the roughness at the point does") {
+TEST_CASE("materials: textured roughness scatters like a constant roughness of the same value") {
   const TexturePtr texture = steps({0.05f, 0.2f, 0.6f});
   Rng rng(41);
   for (const char* type : kModels) {
@@ -67,13 +67,13 @@ TEST_CASE("materials: textured roughness scatters as the roughness at the point 
         worst = std::max<double>(worst, std::abs(s->pdf - plain->pdf(wo, s->wi, kUv)) / s->pdf);
       }
       INFO(type << " of " << alpha);
-      // Plastic takes how much light enters and leaves from the tables of two levels.
+      // Plastic interpolates its transmittance between the tables of two levels.
       CHECK(worst < (std::string(type) == "roughplastic" ? 0.03 : 1e-4));
     }
   }
 }
 
-TEST_CASE("materials: textured roughness samples its density") {
+TEST_CASE("materials: samples of textured roughness match its density") {
   std::uint64_t seed = 700;
   const TexturePtr u = steps({0.03f, 0.3f, 2.0f}), v = steps({0.1f, 0.15f});
   const BsdfPtr models[] = {
@@ -100,7 +100,7 @@ TEST_CASE("materials: textured roughness samples its density") {
     }
 }
 
-TEST_CASE("materials: the lobes of textured roughness are levels that materials share") {
+TEST_CASE("materials: materials with textured roughness share the lobes of roughness levels") {
   for (const char* type : kModels) {
     INFO(type);
     const BsdfPtr a = roughOf(type, steps({0.13f, 0.3f}));
@@ -111,10 +111,10 @@ TEST_CASE("materials: the lobes of textured roughness are levels that materials 
     CHECK(a->lobes()[1]->key() == b->lobes()[0]->key());
     CHECK(a->lobes()[2]->key() == roughOf(type, 0.25)->lobes()[0]->key());
     CHECK(a->lobes()[0]->kind() == LobeKind::isotropic);
-    // A texture that does not vary is a number.
+    // A constant texture is equivalent to a number.
     CHECK(roughOf(type, steps({0.3f, 0.3f}))->lobes().size() == sides);
     CHECK(roughOf(type, steps({-1.0f, -1.0f}))->lobes()[0]->key() == roughOf(type, 1e-5)->lobes()[0]->key());
-    // What is below, above or not a number is clamped.
+    // Values out of range and NaN are clamped.
     const BsdfPtr wild = roughOf(type, steps({-1.0f, 100.0f, std::nanf("")}));
     CHECK(wild->lobes().size() == kRoughnessLevels * sides);
     for (const float u : {0.1f, 0.5f, 0.9f}) {
@@ -125,7 +125,7 @@ TEST_CASE("materials: the lobes of textured roughness are levels that materials 
   }
 }
 
-TEST_CASE("materials: between two levels the mixture names both") {
+TEST_CASE("materials: between two roughness levels the mixture contains the lobes of both") {
   const TexturePtr texture = steps({0.125f, 0.15f, 0.3f, 0.25f});
   for (const char* type : kModels)
     for (const double side : {1.0, -1.0}) {
@@ -141,7 +141,7 @@ TEST_CASE("materials: between two levels the mixture names both") {
       CHECK(between.glossy[1].lobe == first + 1);
       CHECK(between.glossy[0].tint + between.glossy[1].tint == Approx(1.0f));
       CHECK(between.glossy[1].tint == Approx(2.0 * std::log2(0.15 / 0.125)).margin(1e-4));
-      // Both together are nearly the lobe itself.
+      // Their weighted sum approximates the exact lobe.
       const BsdfPtr exact = roughOf(type, 0.15);
       const Vec3 up(wo.x(), wo.y(), std::abs(wo.z()));
       for (const double elevation : {30.0, 40.0, 45.0}) {

@@ -1,4 +1,4 @@
-// What image files say of themselves: how they are encoded, in which order, and what else than colours they hold.
+// Properties of image files: encoding, order of pixels, and channels other than colours.
 
 #include <array>
 
@@ -36,18 +36,18 @@ std::string hdr(const std::string& size, const std::string& pixels, const std::s
   return "#?RADIANCE\nSOFTWARE=test\nFORMAT=32-bit_rle_" + format + "\n\n" + size + "\n" + pixels;
 }
 
-/// A pixel whose red is `sixteenths` of a sixteenth, its green and blue 0.
+/// A pixel whose red is `sixteenths`/16, with green and blue 0.
 std::string red(int sixteenths) {
   return {static_cast<char>(sixteenths), 0, 0, static_cast<char>(132)};
 }
 
-/// Red 0 to 5, each once, as they are stored.
+/// Red values 0 to 5, each once, in the order of storage.
 const std::string kSix = red(0) + red(16) + red(32) + red(48) + red(64) + red(80);
 
 }  // namespace
 
-TEST_CASE("materials: HDR pictures are turned as their size says") {
-  // Where 0 (first stored), 1 (next) and 3 (first of the second line of three) are to be seen.
+TEST_CASE("materials: HDR images are oriented according to their resolution line") {
+  // Expected positions of 0 (first stored), 1 (next) and 3 (first of the second line of three).
   struct Case {
     std::string size;
     int width;
@@ -67,46 +67,47 @@ TEST_CASE("materials: HDR pictures are turned as their size says") {
   }
 }
 
-TEST_CASE("materials: HDR pictures of both run lengths, with either line ending") {
+TEST_CASE("materials: HDR images with both kinds of run lengths and line endings") {
   // 9 pixels: 1, then eight times 2.
   const std::string old = red(16) + red(32) + std::string("\1\1\1\7", 4);
-  // New: the line's length, then red as 1 literal and a run of 8, green and blue as runs of 0, exponents as a run.
+  // New format: the line's length, then red as 1 literal and a run of 8, green and blue as runs of 0, exponents as a
+  // run.
   const std::string coded("\2\2\0\11\1\20\210\40\211\0\211\0\211\204", 14);
   for (const std::string& pixels : {old, coded}) {
     const Image image = readBytes("a.hdr", hdr("-Y 1 +X 9", pixels));
     requireNear(image.at(0, 0), Rgb(1, 0, 0));
     for (int x = 1; x < 9; ++x) requireNear(image.at(x, 0), Rgb(2, 0, 0));
   }
-  // Two run lengths in a row are one number: 1 + 256 times the pixel before.
+  // Two consecutive run lengths form one number: 1 + 256 times the previous pixel.
   const Image longRun = readBytes("a.hdr", hdr("-Y 1 +X 258", red(16) + std::string("\1\1\1\1\1\1\1\1", 8)));
   requireNear(longRun.at(257, 0), Rgb(1, 0, 0));
   const Image windows = readBytes("a.hdr", "#?RGBE\r\nFORMAT=32-bit_rle_rgbe\r\n\r\n-Y 2 +X 3\r\n" + kSix);
   CHECK(windows.at(2, 1).x() == 5.0f);
   CHECK_THAT(faultOfImage(hdr("-Y 1 +X 9", red(16) + std::string("\1\1\1\11", 4))),
-             Catch::Contains("longer than its line"));
+             Catch::Contains("longer than its scanline"));
 }
 
-TEST_CASE("materials: HDR pictures in XYZ become RGB") {
-  // The primaries' white, a luminance of 1.
+TEST_CASE("materials: HDR images in XYZ are converted to RGB") {
+  // The white point of the primaries with a luminance of 1.
   const Image image = readBytes("a.hdr", hdr("-Y 1 +X 1", std::string("\171\200\213\201", 4), "xyze"));
   INFO(image.at(0, 0).transpose());
   CHECK(image.at(0, 0).isApprox(grey(1.0f), 0.02f));
-  // Y alone: the green column of the matrix, without what is negative.
+  // Y only: the green column of the matrix with negative values clamped.
   requireNear(readBytes("a.hdr", hdr("-Y 1 +X 1", std::string("\0\200\0\201", 4), "xyze")).at(0, 0),
               Rgb(0, 1.875991f, 0));
 }
 
-TEST_CASE("materials: HDR pictures that are none are refused for what they are") {
-  CHECK_THAT(faultOfImage(hdr("-Y 1 +X 1", red(1), "luv")), Catch::Contains("\"32-bit_rle_luv\"; known are"));
+TEST_CASE("materials: invalid HDR images are rejected with the reason") {
+  CHECK_THAT(faultOfImage(hdr("-Y 1 +X 1", red(1), "luv")), Catch::Contains("\"32-bit_rle_luv\"; supported are"));
   CHECK_THAT(faultOfImage(hdr("-Y 1 +Y 1", red(1))), Catch::Contains("same axis twice"));
-  CHECK_THAT(faultOfImage(hdr("-Y 1 by 1", red(1))), Catch::Contains("\"by 1\" where its size should be"));
-  CHECK_THAT(faultOfImage(hdr("-Y 9999999 +X 99999999", red(1))), Catch::Contains("beyond what is read"));
-  CHECK_THAT(faultOfImage(hdr("-Y 10000 +X 10000", red(1))), Catch::Contains("too many to be meant by a file of"));
-  CHECK_THAT(faultOfImage(hdr("-Y 2 +X 3", kSix.substr(0, 23))), Catch::Contains("ends too early"));
-  CHECK_THAT(faultOfImage("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n"), Catch::Contains("ends too early"));
+  CHECK_THAT(faultOfImage(hdr("-Y 1 by 1", red(1))), Catch::Contains("found \"by 1\""));
+  CHECK_THAT(faultOfImage(hdr("-Y 9999999 +X 99999999", red(1))), Catch::Contains("outside the supported range"));
+  CHECK_THAT(faultOfImage(hdr("-Y 10000 +X 10000", red(1))), Catch::Contains("cannot contain 10000x10000 pixels"));
+  CHECK_THAT(faultOfImage(hdr("-Y 2 +X 3", kSix.substr(0, 23))), Catch::Contains("unexpected end of file"));
+  CHECK_THAT(faultOfImage("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n"), Catch::Contains("unexpected end of file"));
 }
 
-TEST_CASE("materials: a PNG is read by its gAMA chunk where that is wanted, unless it says that it is sRGB") {
+TEST_CASE("materials: the gAMA chunk of a PNG is used on request unless the file has an sRGB chunk") {
   const TestFolder folder;
   const auto png = [](const std::string& chunks) { return rowPng("\x80\x80\x80", 3, chunks); };
   const auto value = [&](const std::string& bytes, Encoding::Kind kind) {
@@ -122,12 +123,12 @@ TEST_CASE("materials: a PNG is read by its gAMA chunk where that is wanted, unle
   CHECK(value(png(chunk("gAMA", bigEndian(0))), Encoding::Kind::tagged) == Approx(srgb));
 }
 
-TEST_CASE("materials: alpha channels are read by themselves") {
+TEST_CASE("materials: alpha channels are read separately") {
   const TestFolder folder;
   const std::string colours("\xff\0\0\x33\0\xff\0\xcc", 8);
   const std::string png = folder.write("a.png", rowPng(colours, 4)).string(),
                     opaque = folder.write("b.png", rowPng("\xff\xff\xff", 3)).string();
-  // An uncompressed TGA of 32 bits stores blue first, from the bottom.
+  // An uncompressed 32-bit TGA stores blue first, starting at the bottom.
   const std::string tga = folder
                               .write("a.tga", std::string("\0\0\2\0\0\0\0\0\0\0\0\0\2\0\1\0\x20\x8", 18) +
                                                   std::string("\0\0\xff\x33\0\xff\0\xcc", 8))
@@ -141,7 +142,7 @@ TEST_CASE("materials: alpha channels are read by themselves") {
   CHECK_THROWS_WITH(readAlpha(opaque), Catch::Contains("b.png: it has no alpha channel"));
 }
 
-TEST_CASE("materials: the alpha channel of an EXR") {
+TEST_CASE("materials: the alpha channel of an EXR is read") {
   const TestFolder folder;
   const std::string with = (folder.path() / "a.exr").string(), without = (folder.path() / "b.exr").string();
   const Imf::Rgba pixels[] = {{1, 2, 3, 0.25f}, {4, 5, 6, 0.75f}};

@@ -1,4 +1,4 @@
-// Images, textures that use them, mesh files and simple shapes.
+// Images, bitmap textures, mesh files and simple shapes.
 
 #include <catch2/catch.hpp>
 
@@ -37,7 +37,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// A folder of its own, gone at the end.
+/// A temporary folder that is removed at the end.
 class Folder {
  public:
   Folder() {
@@ -63,7 +63,7 @@ std::string bytesOf(const fs::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-/// What the call throws; empty when nothing.
+/// The message of the exception that the call throws; empty if there is none.
 template <class Call>
 std::string faultOf(const Call& call) {
   try {
@@ -110,7 +110,7 @@ Eigen::Affine3f mirror() {
 using Imath::Box2i;
 using Imath::V2i;
 
-/// Pixel (x, y) of channel c holds 100·c + 10·y + x, by its place in the data window's coordinates.
+/// Pixel (x, y) of channel c is 100·c + 10·y + x, in the coordinates of the data window.
 void writeExr(const fs::path& path, const std::vector<std::string>& channels, Imf::PixelType type, const Box2i& display,
               const Box2i& data, Imf::Compression compression = Imf::ZIP_COMPRESSION) {
   Imf::Header header(display, data);
@@ -142,12 +142,12 @@ Box2i box(int left, int top, int right, int bottom) {
   return {V2i(left, top), V2i(right, bottom)};
 }
 
-/// 2×2: black, a grey of code 128; red, white.
+/// 2×2 pixels: black, a grey of code 128; red, white.
 const std::array<std::uint8_t, 12> kPixels = {0, 0, 0, 128, 128, 128, 255, 0, 0, 255, 255, 255};
 
 }  // namespace
 
-TEST_CASE("materials: 8-bit images are decoded as asked") {
+TEST_CASE("materials: 8-bit images are decoded with the requested encoding") {
   const Folder folder;
   const std::string png = (folder / "a.png").string(), bmp = (folder / "a.bmp").string(),
                     tga = (folder / "a.tga").string();
@@ -181,7 +181,7 @@ TEST_CASE("materials: JPEG and HDR images are read") {
     requireNear(readImage(hdr, {kind, 2.2f}).at(9, 2), grey(2.25f), 0.02f);
 }
 
-TEST_CASE("materials: EXR images of half and float, colour and luminance") {
+TEST_CASE("materials: EXR images of half and float with colour and luminance") {
   const Folder folder;
   const fs::path path = folder / "a.exr";
   for (const Imf::PixelType type : {Imf::HALF, Imf::FLOAT})
@@ -200,10 +200,10 @@ TEST_CASE("materials: EXR images of half and float, colour and luminance") {
   REQUIRE_THAT(fault, Contains("a.exr") && Contains("N.X Z"));
 }
 
-TEST_CASE("materials: an EXR picture is its display window") {
+TEST_CASE("materials: an EXR image has the size of its display window") {
   const Folder folder;
   const fs::path path = folder / "a.exr";
-  writeExr(path, {"R", "G", "B"}, Imf::FLOAT, box(0, 0, 3, 3), box(1, 2, 2, 5));  // overlaps the lower rim
+  writeExr(path, {"R", "G", "B"}, Imf::FLOAT, box(0, 0, 3, 3), box(1, 2, 2, 5));  // overlaps the lower edge
   const Image cropped = readImage(path);
   REQUIRE(cropped.width == 4);
   REQUIRE(cropped.height == 4);
@@ -214,11 +214,11 @@ TEST_CASE("materials: an EXR picture is its display window") {
     }
   writeExr(path, {"Y"}, Imf::FLOAT, box(5, 6, 7, 8), box(5, 6, 7, 8));  // the same area, away from the origin
   requireNear(readImage(path).at(0, 0), grey(65), 0);
-  writeExr(path, {"Y"}, Imf::FLOAT, box(0, 0, 2, 2), box(5, 6, 7, 8));  // nothing in common
+  writeExr(path, {"Y"}, Imf::FLOAT, box(0, 0, 2, 2), box(5, 6, 7, 8));  // disjoint
   requireNear(readImage(path).at(1, 1), grey(0), 0);
 }
 
-TEST_CASE("materials: damaged images are refused by name") {
+TEST_CASE("materials: damaged images are rejected with their name") {
   const Folder folder;
   const fs::path exr = folder / "whole.exr";
   writeExr(exr, {"R", "G", "B"}, Imf::FLOAT, box(0, 0, 40, 40), box(0, 0, 40, 40));
@@ -239,7 +239,7 @@ TEST_CASE("materials: damaged images are refused by name") {
   REQUIRE_THAT(faultOf([&] { readImage(folder / "."); }), Contains("not a file"));
 }
 
-TEST_CASE("materials: images cut short are refused whatever the format") {
+TEST_CASE("materials: truncated images of all formats are rejected") {
   const Folder folder;
   std::vector<std::uint8_t> noise(64 * 64 * 3);
   for (std::size_t i = 0; i < noise.size(); ++i) noise[i] = static_cast<std::uint8_t>(i * i / 7);
@@ -296,7 +296,7 @@ Vec2 centre(int x, int y) {
 
 }  // namespace
 
-TEST_CASE("materials: a bitmap shows its pixels at their centres, first row at v = 0") {
+TEST_CASE("materials: a bitmap has its pixel values at their centres and its first row at v = 0") {
   for (const bool nearest : {false, true}) {
     BitmapOptions options;
     options.nearest = nearest;
@@ -309,7 +309,7 @@ TEST_CASE("materials: a bitmap shows its pixels at their centres, first row at v
   }
 }
 
-TEST_CASE("materials: bitmaps repeat, mirror or clamp, each axis by itself") {
+TEST_CASE("materials: bitmaps repeat or mirror or clamp for each axis separately") {
   const auto at = [](Wrap u, Wrap v, int x, int y) {
     BitmapOptions options;
     options.wrapU = u;
@@ -327,14 +327,14 @@ TEST_CASE("materials: bitmaps repeat, mirror or clamp, each axis by itself") {
   requireNear(at(Wrap::zero, Wrap::one, -1, 0), grey(0));
   requireNear(at(Wrap::zero, Wrap::one, 2, 2), grey(1));
   requireNear(at(Wrap::zero, Wrap::one, 2, 1), Rgb(2, 1, 0));
-  // Interpolation reaches across the seam only where the image repeats.
+  // Interpolation crosses the seam only if the image repeats.
   requireNear(makeBitmap(ramp())->eval({0, 0.25f}), Rgb(1.5f, 0, 0));
   BitmapOptions clamped;
   clamped.wrapU = Wrap::clamp;
   requireNear(makeBitmap(ramp(), clamped)->eval({0, 0.25f}), Rgb(0, 0, 0));
 }
 
-TEST_CASE("materials: a bitmap's coordinates are scaled, then moved") {
+TEST_CASE("materials: the coordinates of a bitmap are scaled and then shifted") {
   BitmapOptions options;
   options.uvMap.linear = Vec2(2, -1).asDiagonal();
   options.uvMap.offset = {0.25f, 1};
@@ -346,7 +346,7 @@ TEST_CASE("materials: a bitmap's coordinates are scaled, then moved") {
   requireNear(makeBitmap(ramp(), options)->eval({0.25f, 0.875f}), Rgb(3, 0, 0));
 }
 
-TEST_CASE("materials: bitmaps bear odd coordinates and refuse empty images") {
+TEST_CASE("materials: bitmaps accept extreme coordinates and reject empty images") {
   const TexturePtr texture = makeBitmap(ramp());
   for (const float odd : {1e30f, -std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
     REQUIRE(texture->eval({odd, 0.5f}).allFinite());
@@ -356,7 +356,7 @@ TEST_CASE("materials: bitmaps bear odd coordinates and refuse empty images") {
   REQUIRE_THROWS_AS(makeBitmap(nullptr), std::runtime_error);
 }
 
-TEST_CASE("materials: checkerboard") {
+TEST_CASE("materials: a checkerboard alternates its colours") {
   const TexturePtr a = constantTexture(Rgb(1, 0, 0)), b = makeBitmap(ramp());
   const TexturePtr board = makeCheckerboard(a, b);
   requireNear(board->eval({0.2f, 0.3f}), Rgb(1, 0, 0));
@@ -371,7 +371,7 @@ TEST_CASE("materials: checkerboard") {
 
 // ---- OBJ
 
-TEST_CASE("scenes: OBJ shares vertices, and keeps normals and texture coordinates") {
+TEST_CASE("scenes: OBJ shares vertices and keeps normals and texture coordinates") {
   const Folder folder;
   const fs::path path =
       folder.write("quad.obj",
@@ -382,7 +382,7 @@ TEST_CASE("scenes: OBJ shares vertices, and keeps normals and texture coordinate
   REQUIRE(mesh.positions.size() == 4);
   REQUIRE(mesh.triangles == std::vector<std::array<std::uint32_t, 3>>{{0, 1, 2}, {0, 2, 3}});
   for (const Vec3& n : mesh.normals) requireNear(n, Vec3::UnitZ());
-  REQUIRE(mesh.uvs[3] == Vec2(0.25f, 0.25f));  // v turned downwards
+  REQUIRE(mesh.uvs[3] == Vec2(0.25f, 0.25f));  // v downwards
   REQUIRE(mesh.positions[2] == Vec3(1, 1, 0));
 
   MeshOptions asIs;
@@ -393,7 +393,7 @@ TEST_CASE("scenes: OBJ shares vertices, and keeps normals and texture coordinate
   REQUIRE(readObj(path, flat).normals.empty());
 }
 
-TEST_CASE("scenes: OBJ corners that differ in normal or uv become vertices of their own") {
+TEST_CASE("scenes: OBJ corners that differ in normal or uv become separate vertices") {
   const Folder folder;
   const std::string text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 1\nvn 0 1 1\nvt 0 0\nvt 1 1\n";
   const TriangleMesh normals = readObj(folder.write("a.obj", text + "f 1//1 2//1 3//1\nf 1//1 3//2 4//1\n"), {});
@@ -401,10 +401,10 @@ TEST_CASE("scenes: OBJ corners that differ in normal or uv become vertices of th
   REQUIRE(normals.uvs.empty());
   const TriangleMesh uvs = readObj(folder.write("b.obj", text + "f 1/1 2/1 3/1\nf 1/2 3/1 4\n"), {});
   REQUIRE(uvs.positions.size() == 5);
-  REQUIRE(uvs.uvs.back() == Vec2(0, 0));  // a corner without one
+  REQUIRE(uvs.uvs.back() == Vec2(0, 0));  // a corner without texture coordinates
 }
 
-TEST_CASE("scenes: OBJ polygons are divided, indented ones too") {
+TEST_CASE("scenes: convex and concave OBJ polygons are triangulated") {
   const Folder folder;
   const auto areaOfPolygon = [&folder](const std::vector<Vec2>& corners) {
     std::string text, face = "f";
@@ -418,7 +418,7 @@ TEST_CASE("scenes: OBJ polygons are divided, indented ones too") {
   REQUIRE(areaOfPolygon({{0, 0}, {4, 0}, {1, 1}, {0, 4}}) == Approx(4));
   REQUIRE(areaOfPolygon({{1, 1}, {0, 4}, {0, 0}, {4, 0}}) == Approx(4));
   REQUIRE(areaOfPolygon({{0, 4}, {0, 0}, {4, 0}, {1, 1}}) == Approx(4));
-  // A comb of two teeth.
+  // A comb with two teeth.
   REQUIRE(areaOfPolygon({{0, 0}, {5, 0}, {5, 3}, {4, 3}, {4, 1}, {3, 1}, {3, 3}, {0, 3}}) == Approx(13));
   std::vector<Vec2> round;
   for (int i = 0; i < 300; ++i)
@@ -426,9 +426,9 @@ TEST_CASE("scenes: OBJ polygons are divided, indented ones too") {
   REQUIRE(areaOfPolygon(round) == Approx(std::numbers::pi).epsilon(1e-3));
 }
 
-TEST_CASE("scenes: missing normals are averaged by angle unless flat ones are asked for") {
+TEST_CASE("scenes: missing normals are averaged by angle unless flat ones are requested") {
   const Folder folder;
-  // A corner of a cube: three squares, one of them in two triangles that must not count twice.
+  // A corner of a cube: three squares, one of them as two triangles that must not count twice.
   const fs::path path = folder.write("corner.obj",
                                      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\n"
                                      "f 1 2 3\nf 1 3 4\nf 5 6 2 1\nf 7 5 1 4\n");
@@ -439,13 +439,13 @@ TEST_CASE("scenes: missing normals are averaged by angle unless flat ones are as
   MeshOptions flat;
   flat.faceNormals = true;
   REQUIRE(readObj(path, flat).normals.empty());
-  // One corner without a normal: none of the file's are used.
+  // One corner has no normal, so none of the file's normals are used.
   const TriangleMesh partial =
       readObj(folder.write("b.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 1 0 0\nf 1//1 2//1 3\n"), {});
   requireNear(partial.normals[0], Vec3::UnitZ());
 }
 
-TEST_CASE("scenes: normals and front under transforms") {
+TEST_CASE("scenes: transforms are applied to normals and keep the front") {
   const Folder folder;
   const std::string triangle = "v 0 0 0\nv 1 0 0\nv 0 1 1\n";
   const fs::path with = folder.write("with.obj", triangle + "vn 0 -1 1\nf 1//1 2//1 3//1\n");
@@ -460,7 +460,7 @@ TEST_CASE("scenes: normals and front under transforms") {
   const TriangleMesh mirrored = readObj(with, placed(mirror()));
   requireNear(mirrored.normals[0], Vec3(0, -1, 1).normalized());
   requireNear(normalOf(mirrored, 0), mirrored.normals[0]);
-  // Without normals the winding in the world decides.
+  // Without normals, the winding in world space determines the front.
   const TriangleMesh wound = readObj(without, placed(mirror()));
   requireNear(normalOf(wound, 0), Vec3(0, 1, -1).normalized());
   requireNear(wound.normals[0], normalOf(wound, 0));
@@ -474,7 +474,7 @@ TEST_CASE("scenes: normals and front under transforms") {
   }
 }
 
-TEST_CASE("scenes: broken OBJ files are refused by name") {
+TEST_CASE("scenes: malformed OBJ files are rejected with their name") {
   const Folder folder;
   const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\n";
   const auto fault = [&folder](const std::string& text) {
@@ -482,7 +482,7 @@ TEST_CASE("scenes: broken OBJ files are refused by name") {
     REQUIRE_THAT(what, Contains("bad.obj: ") && !Contains("\n"));
     return what;
   };
-  REQUIRE_THAT(fault(vertices + "f 1 2 4\n"), Contains("vertex that is not there (there are 3)"));
+  REQUIRE_THAT(fault(vertices + "f 1 2 4\n"), Contains("vertex that does not exist (the file has 3)"));
   REQUIRE_THAT(fault(vertices + "f 1 2 -4\n"), Contains("vertex"));
   REQUIRE_THAT(fault(vertices + "f 0 1 2\n"), Contains("vertex"));
   REQUIRE_THAT(fault(vertices + "f 1 2 3 9\n"), Contains("vertex"));
@@ -504,7 +504,7 @@ TEST_CASE("scenes: broken OBJ files are refused by name") {
   REQUIRE_THAT(faultOf([&] { readObj(folder / ".", {}); }), Contains("not a file"));
 }
 
-TEST_CASE("scenes: OBJ files of many hands") {
+TEST_CASE("scenes: OBJ files with various line endings and indices and orders are read") {
   const Folder folder;
   const auto read = [&folder](const std::string& text) { return readObj(folder.write("a.obj", text), {}); };
   const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.5 0.25\nvn 1 0 0\n";
@@ -579,7 +579,7 @@ std::string binaryPly(bool big) {
 
 }  // namespace
 
-TEST_CASE("scenes: PLY in text and in either byte order") {
+TEST_CASE("scenes: PLY files in text and in either byte order are read") {
   const Folder folder;
   for (const std::string& bytes : {asciiPly(), binaryPly(false), binaryPly(true)}) {
     const TriangleMesh mesh = readPly(folder.write("a.ply", bytes), {});
@@ -594,7 +594,7 @@ TEST_CASE("scenes: PLY in text and in either byte order") {
   REQUIRE(readPly(folder.write("a.ply", asciiPly()), turned).uvs[4] == Vec2(0.5f, 0.75f));
 }
 
-TEST_CASE("scenes: PLY without normals, by other names, with Windows line ends") {
+TEST_CASE("scenes: PLY files without normals or with other property names or line endings are read") {
   const Folder folder;
   const TriangleMesh mesh = readPly(
       folder.write(
@@ -608,7 +608,7 @@ TEST_CASE("scenes: PLY without normals, by other names, with Windows line ends")
   REQUIRE(mesh.uvs[2] == Vec2(0, 1));
 }
 
-TEST_CASE("scenes: broken PLY files are refused by name") {
+TEST_CASE("scenes: malformed PLY files are rejected with their name") {
   const Folder folder;
   const auto fault = [&folder](const std::string& bytes) {
     const std::string what = faultOf([&] { readPly(folder.write("bad.ply", bytes), {}); });
@@ -621,7 +621,7 @@ TEST_CASE("scenes: broken PLY files are refused by name") {
   };
   REQUIRE_THAT(fault(""), Contains("not a PLY"));
   REQUIRE_THAT(fault("plywood\n"), Contains("not a PLY"));
-  REQUIRE_THAT(fault("ply\nformat ascii 1.0\n"), Contains("does not end"));
+  REQUIRE_THAT(fault("ply\nformat ascii 1.0\n"), Contains("no end_header line"));
   REQUIRE_THAT(fault("ply\nend_header\n"), Contains("format"));
   REQUIRE_THAT(fault(replaced(asciiPly(), "ascii", "morse")), Contains("morse"));
   REQUIRE_THAT(fault(replaced(asciiPly(), "double", "quad")), Contains("quad"));
@@ -634,7 +634,7 @@ TEST_CASE("scenes: broken PLY files are refused by name") {
   REQUIRE_THAT(fault(replaced(asciiPly(), "0.5 2 0", "0.5 nan 0")), Contains("finite"));
   REQUIRE_THAT(fault(replaced(asciiPly(), "face 2", "face 0")), Contains("no triangles"));
   const std::string huge = replaced(binaryPly(false), "vertex 5", "vertex 18446744073709551615");
-  REQUIRE_THAT(fault(huge), Contains("ends too early"));
+  REQUIRE_THAT(fault(huge), Contains("truncated"));
   for (const std::string& bytes : {asciiPly(), binaryPly(false)})
     for (std::size_t size = 0; size + 12 < bytes.size(); size += 7) fault(bytes.substr(0, size));
   REQUIRE_THAT(faultOf([&] { readPly(folder / "none.ply", {}); }), Contains("none.ply: no such file"));
@@ -654,7 +654,7 @@ TEST_CASE("scenes: flipped bits in a PLY file never crash") {
 
 // ---- Simple shapes
 
-TEST_CASE("scenes: rectangle") {
+TEST_CASE("scenes: makeRectangle creates a transformed rectangle") {
   const TriangleMesh mesh = makeRectangle({});
   REQUIRE(areaOf(mesh) == Approx(4));
   for (std::size_t i = 0; i < 4; ++i) {
@@ -669,7 +669,7 @@ TEST_CASE("scenes: rectangle") {
   requireNear(normalOf(makeRectangle(flipped), 1), -Vec3::UnitZ());
 }
 
-TEST_CASE("scenes: cube") {
+TEST_CASE("scenes: makeCube creates a transformed cube") {
   for (const bool mirrored : {false, true}) {
     MeshOptions options = placed(mirrored ? mirror() : Eigen::Affine3f::Identity());
     options.faceNormals = mirrored;
@@ -684,7 +684,7 @@ TEST_CASE("scenes: cube") {
   }
 }
 
-TEST_CASE("scenes: disk") {
+TEST_CASE("scenes: makeDisk creates a transformed disk") {
   const Eigen::Affine3f transform =
       Eigen::Translation3f(1, 2, 3) * Eigen::AngleAxisf(0.7f, Vec3(1, 2, 2) / 3) * Eigen::Scaling(2.0f, 2.0f, 5.0f);
   const Disk disk = makeDisk(placed(transform));
@@ -692,7 +692,7 @@ TEST_CASE("scenes: disk") {
   REQUIRE(disk.u.norm() == Approx(2));
   requireNear(Vec3(disk.u.cross(disk.v) / 4), Vec3(transform.linear().col(2) / 5));
   REQUIRE_FALSE(disk.flipped);
-  // Mirrored, texture and front stay where they are: the edges swap hands.
+  // Under mirroring, texture and front stay in place: (u, v) changes its handedness, and `flipped` compensates.
   const Disk mirrored = makeDisk(placed(mirror()));
   requireNear(mirrored.u.cross(mirrored.v), -Vec3::UnitZ());
   REQUIRE(mirrored.flipped);
@@ -704,7 +704,7 @@ TEST_CASE("scenes: disk") {
   requireNear(ellipse.v, Vec3(0, 2, 0));
 }
 
-TEST_CASE("scenes: sphere") {
+TEST_CASE("scenes: makeSphere creates a transformed sphere") {
   const Eigen::Affine3f transform =
       Eigen::Translation3f(1, 2, 3) * Eigen::AngleAxisf(1.2f, Vec3::UnitY()) * Eigen::Scaling(-3.0f);
   const Sphere sphere = makeSphere({0, 1, 0}, 0.5f, placed(transform));
@@ -721,7 +721,7 @@ TEST_CASE("scenes: sphere") {
                     std::runtime_error);
 }
 
-TEST_CASE("scenes: cylinder") {
+TEST_CASE("scenes: makeCylinder creates a transformed cylinder") {
   const Eigen::Affine3f transform =
       Eigen::Translation3f(1, 2, 3) * Eigen::AngleAxisf(1.5707964f, Vec3::UnitX()) * Eigen::Scaling(2.0f, 2.0f, 5.0f);
   const Cylinder cylinder = makeCylinder({0, 0, 1}, {0, 0, 2}, 0.5f, placed(transform));
@@ -731,12 +731,12 @@ TEST_CASE("scenes: cylinder") {
   REQUIRE(cylinder.v.norm() == Approx(1));
   REQUIRE(cylinder.u.dot(cylinder.v) == Approx(0).margin(1e-6));
   const auto scaled = [](float x, float y, float z) { return placed(Eigen::Affine3f(Eigen::Scaling(x, y, z))); };
-  REQUIRE_THROWS_WITH(makeCylinder({0, 0, 0}, {0, 0, 1}, 1, scaled(1, 2, 1)), Contains("round"));
-  REQUIRE_THROWS_WITH(makeCylinder({0, 0, 0}, {1, 0, 1}, 1, scaled(1, 1, 2)), Contains("round"));
+  REQUIRE_THROWS_WITH(makeCylinder({0, 0, 0}, {0, 0, 1}, 1, scaled(1, 2, 1)), Contains("circular"));
+  REQUIRE_THROWS_WITH(makeCylinder({0, 0, 0}, {1, 0, 1}, 1, scaled(1, 1, 2)), Contains("circular"));
   REQUIRE_THROWS_WITH(makeCylinder({0, 0, 1}, {0, 0, 1}, 1, {}), Contains("two different"));
 }
 
-TEST_CASE("scenes: transforms that flatten, project or are not numbers are refused") {
+TEST_CASE("scenes: singular and projective and non-finite transforms are rejected") {
   std::array<Eigen::Matrix4f, 3> bad;
   bad.fill(Eigen::Matrix4f::Identity());
   bad[0](2, 2) = 0;

@@ -1,4 +1,4 @@
-// Polygons, groups and creases: what meshes of files become, whatever the format.
+// Polygons, groups and smoothing of meshes in files of all formats.
 
 #include <catch2/catch.hpp>
 
@@ -55,8 +55,8 @@ std::string objOf(const Polygon& corners) {
   return text + face + "\n";
 }
 
-/// Two squares that share the edge from (0,0,0) to (0,1,0): one in z = 0 towards +x, the other turned up about the edge
-/// by so many degrees. They are faces 1 2 3 4 and 5 1 4 6.
+/// Two squares that share the edge from (0,0,0) to (0,1,0): one in z = 0 towards +x, the other rotated up about the
+/// edge by this many degrees. They are faces 1 2 3 4 and 5 1 4 6.
 std::string hinge(float degrees) {
   const float angle = degrees * std::numbers::pi_v<float> / 180;
   const float x = -std::cos(angle), z = std::sin(angle);
@@ -93,7 +93,7 @@ std::string faultOfReading(const auto& read) {
 
 }  // namespace
 
-TEST_CASE("scenes: concave polygons keep their area from every corner, in PLY and OBJ") {
+TEST_CASE("scenes: concave polygons in PLY and OBJ keep their area for every first corner") {
   const TestFolder folder;
   const std::vector<std::pair<Polygon, double>> shapes = {
       {{{-0.8f, -0.8f}, {0, 0}, {0.8f, -0.8f}, {0, 0.2f}}, 0.16},            // dart
@@ -113,8 +113,8 @@ TEST_CASE("scenes: concave polygons keep their area from every corner, in PLY an
     }
 }
 
-TEST_CASE("scenes: dividing a polygon of many corners takes quadratic time at most") {
-  // Teeth along a straight side: half of the corners are reflex, and ears are found late.
+TEST_CASE("scenes: triangulating a polygon with many corners takes at most quadratic time") {
+  // Teeth along a straight side: half of the corners are reflex, and ears are found late in the search.
   std::vector<Eigen::Vector3d> comb;
   constexpr int kTeeth = 1000;
   for (int i = 0; i < kTeeth; ++i) {
@@ -136,7 +136,7 @@ TEST_CASE("scenes: dividing a polygon of many corners takes quadratic time at mo
   CHECK(area == Approx(expected));
 }
 
-TEST_CASE("scenes: PLY faces may come before vertices") {
+TEST_CASE("scenes: PLY faces may precede vertices") {
   const TestFolder folder;
   const TriangleMesh mesh = readPly(
       folder.write("a.ply",
@@ -147,7 +147,7 @@ TEST_CASE("scenes: PLY faces may come before vertices") {
   CHECK(areaOf(mesh) == Approx(0.16));
 }
 
-TEST_CASE("scenes: PLY texture coordinates may be those of faces") {
+TEST_CASE("scenes: PLY texture coordinates of faces are read") {
   const TestFolder folder;
   const auto ply = [&](const std::string& name, const std::string& faces) {
     return folder.write(
@@ -158,7 +158,7 @@ TEST_CASE("scenes: PLY texture coordinates may be those of faces") {
             name + "\nproperty int texnumber\nend_header\n0 0 0 9 9\n1 0 0 9 9\n1 1 0 9 9\n0 1 0 9 9\n" + faces);
   };
   for (const std::string name : {"texcoord", "texture_uv"}) {
-    // The second triangle shows another part of the image, but for the corner at vertex 2.
+    // The second triangle shows another part of the image, except at the corner at vertex 2.
     const TriangleMesh mesh =
         readPly(ply(name, "3 0 1 2 6 0 0 0.5 0 0.5 0.5 0\n3 0 2 3 6 0.25 0 0.5 0.5 0.25 0.75 0\n"), {});
     REQUIRE(mesh.triangles == std::vector<std::array<std::uint32_t, 3>>{{0, 1, 2}, {3, 2, 4}});
@@ -172,11 +172,11 @@ TEST_CASE("scenes: PLY texture coordinates may be those of faces") {
   const auto fault = [&](const std::string& faces) {
     return faultOfReading([&] { readPly(ply("texcoord", faces), {}); });
   };
-  CHECK_THAT(fault("3 0 1 2 4 0 0 1 1 0\n3 0 2 3 0 0\n"), Contains("3 corners has 4 texture coordinates"));
+  CHECK_THAT(fault("3 0 1 2 4 0 0 1 1 0\n3 0 2 3 0 0\n"), Contains("3 corners has 4 texture coordinate"));
   CHECK_THAT(fault("3 0 1 2 6 0 0 1 1 1 nan 0\n3 0 2 3 0 0\n"), Contains("not a finite number"));
 }
 
-TEST_CASE("scenes: normals are smooth over edges below maxSmoothAngle only") {
+TEST_CASE("scenes: normals are smooth only across edges below maxSmoothAngle") {
   const TestFolder folder;
   const std::filesystem::path path = folder.write("a.obj", hinge(40) + "f 1 2 3 4\nf 5 1 4 6\n");
   CHECK(largestTurn(readObj(path, {})) == Approx(20));
@@ -188,22 +188,22 @@ TEST_CASE("scenes: normals are smooth over edges below maxSmoothAngle only") {
   CHECK(largestTurn(smooth) == Approx(20));
 }
 
-TEST_CASE("scenes: maxSmoothAngle looks at places, not at indices, and does without the file's normals") {
+TEST_CASE("scenes: maxSmoothAngle compares positions instead of indices and ignores the normals of the file") {
   const TestFolder folder;
-  // The second square has vertices of its own, and all have a normal that is wrong.
+  // The second square has its own vertices, and all vertices have a wrong normal.
   const std::string text = hinge(40) + "v 0 0 0\nv 0 1 0\nvn 1 0 0\nf 1//1 2//1 3//1 4//1\nf 5//1 7//1 8//1 6//1\n";
   const std::filesystem::path path = folder.write("a.obj", text);
   CHECK(largestTurn(readObj(path, smoothUpTo(39))) == Approx(0).margin(1e-3));
   const TriangleMesh smooth = readObj(path, smoothUpTo(41));
   CHECK(smooth.positions.size() == 6);
   CHECK(largestTurn(smooth) == Approx(20));
-  // The angle is that in the world.
+  // The angle is measured in world space.
   MeshOptions stretched = smoothUpTo(60);
   stretched.toWorld = Eigen::Affine3f(Eigen::Scaling(1.0f, 1.0f, 10.0f)).matrix();
   CHECK(largestTurn(readObj(path, stretched)) == Approx(0).margin(1e-3));
 }
 
-TEST_CASE("scenes: an OBJ's normals are smooth over its groups as in Mitsuba") {
+TEST_CASE("scenes: the normals of an OBJ are smooth within its groups as in Mitsuba") {
   const TestFolder folder;
   const std::filesystem::path path = folder.write("a.obj", hinge(40) + "g a\nf 1 2 3 4\ng b\nf 5 1 4 6\n");
   const auto turn = [&](ObjGrouping grouping) {
@@ -217,9 +217,9 @@ TEST_CASE("scenes: an OBJ's normals are smooth over its groups as in Mitsuba") {
   CHECK(turn(ObjGrouping::collapsed) == Approx(20));
 }
 
-TEST_CASE("scenes: the meshes of an OBJ are counted as Mitsuba 0.6 does") {
+TEST_CASE("scenes: the meshes of an OBJ are numbered as in Mitsuba 0.6") {
   const TestFolder folder;
-  // Neither a second `g` before any face nor `o` begins a mesh; `usemtl` does.
+  // Neither a second `g` before any face nor `o` begins a mesh, but `usemtl` does.
   const std::filesystem::path path =
       folder.write("a.obj",
                    "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 2 0\nv 0 3 0\nv 0 4 0\ng a\nusemtl one\ng b\nf 1 2 3\no c\nf 1 "
@@ -240,7 +240,7 @@ TEST_CASE("scenes: the meshes of an OBJ are counted as Mitsuba 0.6 does") {
              Contains("a.obj: there is no mesh 3: the file has 3, counted from 0"));
 }
 
-TEST_CASE("scenes: readers of meshes say alike why a file cannot be had") {
+TEST_CASE("scenes: all mesh readers report in the same way why a file cannot be opened") {
   const TestFolder folder;
   for (const std::string type : {"obj", "ply", "serialized"}) {
     const auto fault = [&](const std::filesystem::path& path) {
@@ -257,7 +257,7 @@ TEST_CASE("scenes: readers of meshes say alike why a file cannot be had") {
   }
 }
 
-TEST_CASE("scenes: a vertex too far away is refused") {
+TEST_CASE("scenes: a vertex that is too far away is rejected") {
   const TestFolder folder;
   const auto fault = [&](const std::string& x) {
     return faultOfReading([&] { readObj(folder.write("a.obj", "v 0 0 0\nv " + x + " 0 0\nv 0 1 0\nf 1 2 3\n"), {}); });

@@ -1,4 +1,4 @@
-// Serialized meshes, written here as Mitsuba writes them.
+// Serialized meshes, written here in Mitsuba's format.
 
 #include <cstring>
 #include <fstream>
@@ -24,7 +24,7 @@ struct Written {
   std::uint32_t flags = 0x1003;  ///< single precision, normals, texture coordinates
   std::uint64_t vertices = 3, triangles = 1;
   std::uint32_t lastIndex = 2;
-  float shift = 0;  ///< of x
+  float shift = 0;  ///< added to x
 };
 
 template <class Real>
@@ -86,7 +86,7 @@ TriangleMesh read(const std::string& bytes, int index = 0, const MeshOptions& op
 
 }  // namespace
 
-TEST_CASE("scenes: serialized meshes of both versions and precisions") {
+TEST_CASE("scenes: serialized meshes of both versions and precisions are read") {
   Written mesh;
   mesh.version = GENERATE(std::uint16_t{3}, std::uint16_t{4});
   mesh.flags = GENERATE(0x1003u, 0x2003u, 0x200bu);
@@ -98,19 +98,19 @@ TEST_CASE("scenes: serialized meshes of both versions and precisions") {
   CHECK(result.triangles == std::vector<std::array<std::uint32_t, 3>>{{0, 1, 2}});
 }
 
-TEST_CASE("scenes: serialized meshes are told apart by index") {
+TEST_CASE("scenes: serialized meshes are selected by index") {
   Written first, second;
   second.shift = 10;
   second.flags = 0x1000;
   const TriangleMesh mesh = read(fileOf({first, second, first}), 1);
   CHECK(mesh.positions[0].x() == 10);
   CHECK(mesh.uvs.empty());
-  CHECK(mesh.normals.size() == 3);  // made
+  CHECK(mesh.normals.size() == 3);  // computed
   second.flags = 0x1011;
-  CHECK(read(fileOf({second})).normals.empty());  // flat, says the file
+  CHECK(read(fileOf({second})).normals.empty());  // flat according to the file's flag
 }
 
-TEST_CASE("scenes: broken serialized meshes are refused") {
+TEST_CASE("scenes: malformed serialized meshes are rejected") {
   const Written good;
   const std::string bytes = fileOf({good, good});
   CHECK_THROWS_WITH(read(bytes, 2), Contains("a.serialized: there is no mesh 2") && Contains("has 2"));
@@ -132,10 +132,10 @@ TEST_CASE("scenes: broken serialized meshes are refused") {
   bad.triangles = std::uint64_t{1} << 62;
   CHECK_THROWS_WITH(read(fileOf({bad})), Contains("damaged"));
   bad.triangles = 2;
-  CHECK_THROWS_WITH(read(fileOf({bad})), Contains("damaged or cut short"));
+  CHECK_THROWS_WITH(read(fileOf({bad})), Contains("damaged or truncated"));
 }
 
-TEST_CASE("scenes: any byte of a serialized mesh may be wrong") {
+TEST_CASE("scenes: serialized meshes with any wrong or missing byte never crash") {
   const std::string bytes = fileOf({Written{}, Written{}});
   for (std::size_t i = 0; i < bytes.size(); ++i) {
     std::string broken = bytes;

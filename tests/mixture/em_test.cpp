@@ -1,4 +1,4 @@
-// Expectation maximisation, static and on-line.
+// Weighted EM and on-line (stepwise) EM.
 #include "tests/support/mixture_test_tools.h"
 
 #include <algorithm>
@@ -44,7 +44,7 @@ const Mixture kTruth{makeGaussian(0.5f, {0.3f, 0.2f}, 0.1f, 0.05f, 0.6f),
 const Mixture kStart{makeGaussian(0.4f, {0.5f, 0.5f}, 0.2f, 0.2f, 0), makeGaussian(0.3f, {-0.6f, 0.2f}, 0.2f, 0.2f, 0),
                      makeGaussian(0.3f, {0, -0.7f}, 0.2f, 0.2f, 0)};
 
-// Light of three lobes and constant radiance.
+// Samples from three lobes and a constant background, over the hemisphere.
 struct Target {
   Mixture lobes = kTruth;
   float background;
@@ -70,7 +70,7 @@ double likelihood(const Points& points, const StepwiseEm& em) {
   return meanLogLikelihood(points, em.gaussians(), em.background());
 }
 
-// Everything a renderer relies on.
+// Checks everything that the renderer relies on.
 bool isValid(const StepwiseEm& em) {
   double sum = 0;
   for (const Gaussian& g : em.gaussians()) {
@@ -93,7 +93,7 @@ TEST_CASE("mixture: weighted EM recovers a known mixture") {
   CHECK(meanLogLikelihood(points, fitted) >= meanLogLikelihood(points, kTruth) - 1e-4);
 }
 
-TEST_CASE("mixture: weighted EM undoes the density its points were drawn from") {
+TEST_CASE("mixture: weighted EM accounts for the density of its points") {
   // Points of a wide Gaussian, weighted by target / source, fit the target.
   const Mixture wide{makeGaussian(1, {0, 0}, 0.6f, 0.6f, 0)};
   Rng rng(42);
@@ -104,7 +104,7 @@ TEST_CASE("mixture: weighted EM undoes the density its points were drawn from") 
   CHECK(same(fitted, kTruth, 0.03f));
 }
 
-TEST_CASE("mixture: weighted EM knows only ratios of weights, and a weight of two is two points") {
+TEST_CASE("mixture: weighted EM depends only on ratios of weights and treats a weight of two as two points") {
   Rng rng(43);
   Points points = drawPoints(kTruth, 500, rng);
   Points doubled = points, scaled = points;
@@ -122,7 +122,7 @@ TEST_CASE("mixture: weighted EM knows only ratios of weights, and a weight of tw
   CHECK(same(once, large, 1e-5f));
 }
 
-TEST_CASE("mixture: weighted EM keeps its floor and its manners") {
+TEST_CASE("mixture: weighted EM keeps the minimum variance and handles empty and degenerate input") {
   Mixture fitted = kStart;
   CHECK(weightedEm({}, fitted) == 0);
   CHECK(weightedEm(Points{{{0, 0}, 0}}, fitted) == 0);
@@ -139,14 +139,14 @@ TEST_CASE("mixture: weighted EM keeps its floor and its manners") {
   }
   CHECK(sum == Approx(1));
 
-  // A point a thousand standard deviations from every component still draws one to it.
+  // A point a thousand standard deviations from every component still attracts one of them.
   Mixture narrow{makeGaussian(1, {0, 0}, 1e-3f, 1e-3f, 0), makeGaussian(1, {0.1f, 0}, 1e-3f, 1e-3f, 0)};
   weightedEm(Points{{{0, 0}, 1}, {{0.9f, 0.9f}, 1}}, narrow);
   CHECK(narrow[1].meanX == Approx(0.9f));
   CHECK(smallestEigenvalue(narrow[1].cov) > 0);
 }
 
-TEST_CASE("mixture: the likelihood that EM raises never falls") {
+TEST_CASE("mixture: the likelihood never decreases during EM") {
   Rng rng(44);
   const Points points = drawPoints(kTruth, 1000, rng);
   Mixture fitted = kStart;
@@ -160,7 +160,7 @@ TEST_CASE("mixture: the likelihood that EM raises never falls") {
   CHECK(meanLogLikelihood(Points{{{50, 50}, 1}}, fitted) == -std::numeric_limits<double>::infinity());
 }
 
-TEST_CASE("mixture: on-line training comes closer to the light with every pass") {
+TEST_CASE("mixture: on-line training approaches the true distribution with more passes") {
   for (const float background : {0.05f, 0.25f, 0.5f}) {
     const Target target{.background = background};
     double after[3] = {}, truth = 0, learnt = 0;
@@ -181,8 +181,8 @@ TEST_CASE("mixture: on-line training comes closer to the light with every pass")
       after[2] += likelihood(unseen, em) / kRepeats;
       learnt += em.background() / kRepeats;
     }
-    INFO("background " << background << ", learnt " << learnt << ", short of the truth by " << truth - after[0] << ", "
-                       << truth - after[1] << ", " << truth - after[2]);
+    INFO("background " << background << ", learnt " << learnt << ", log-likelihood below the truth by "
+                       << truth - after[0] << ", " << truth - after[1] << ", " << truth - after[2]);
     CHECK(after[1] > after[0]);
     CHECK(after[2] > after[1]);
     CHECK(truth - after[0] < 0.15);
@@ -191,17 +191,17 @@ TEST_CASE("mixture: on-line training comes closer to the light with every pass")
   }
 }
 
-TEST_CASE("mixture: the priors rule while points are few") {
-  // One point in a lobe of its own: whatever it says, u ≥ 8 / (1 + 8 + K v).
+TEST_CASE("mixture: the priors dominate while there are few points") {
+  // A single point: u ≥ 8 / (1 + 8 + K v) wherever it is.
   StepwiseEm em(8);
   em.fit(Points{{{0.3f, 0.4f}, 1}});
   const float least = 8.0f / (1 + 8 + 8 * StepwiseEm::kPriorV);
   CHECK(em.background() >= least);
   CHECK(em.background() <= least + 1.0f / (1 + 8 + 8 * StepwiseEm::kPriorV));
 
-  // One component and no background but the pseudo-count's: every point belongs to the Gaussian, so all is known.
+  // One component and no background except the prior's: every point belongs to the Gaussian, so the result is known:
   // Σ = b I / (a + n) and u = 8 / (n + 8 + v).
-  const int n = 400;  // few enough for Σ to stay above its floor
+  const int n = 400;  // few enough for Σ to stay above its lower bound
   StepwiseEm one(1);
   one.fit(Points(n, {{0.3f, 0.4f}, 1}));
   CHECK(one.background() == Approx(8.0 / (n + 8 + StepwiseEm::kPriorV)).epsilon(0.05));
@@ -211,7 +211,7 @@ TEST_CASE("mixture: the priors rule while points are few") {
   CHECK(narrow.gaussians()[0].cov.xx == Approx(StepwiseEm::kPriorB / (StepwiseEm::kPriorA + n)).epsilon(0.02));
 }
 
-TEST_CASE("mixture: on-line training does not mind the order of its points") {
+TEST_CASE("mixture: on-line training hardly depends on the order of its points") {
   const Target target{.background = 0.2f};
   Rng rng(46);
   const Points unseen = target.draw(rng, 4000);
@@ -225,7 +225,7 @@ TEST_CASE("mixture: on-line training does not mind the order of its points") {
   CHECK(std::abs(likelihood(unseen, sorted) - likelihood(unseen, shuffled)) < 0.03);
 }
 
-TEST_CASE("mixture: on-line training knows only ratios of weights, is repeatable and can be copied") {
+TEST_CASE("mixture: on-line training depends only on ratios of weights and is deterministic") {
   const Target target{.background = 0.3f};
   Rng rng(47);
   Points points = target.draw(rng, 300), scaled = points;
@@ -242,7 +242,7 @@ TEST_CASE("mixture: on-line training knows only ratios of weights, is repeatable
   CHECK(same(one.gaussians(), copy.gaussians(), 0));
 }
 
-TEST_CASE("mixture: points that do not count are ignored") {
+TEST_CASE("mixture: invalid points are ignored") {
   const Target target{.background = 0.3f};
   Rng rng(48);
   const Points points = target.draw(rng, 100);
@@ -265,7 +265,7 @@ TEST_CASE("mixture: points that do not count are ignored") {
   CHECK(isValid(em));
 }
 
-TEST_CASE("mixture: training is valid on hostile points") {
+TEST_CASE("mixture: training stays valid on degenerate points") {
   Rng rng(49);
   const Target target{.background = 0.3f};
   std::vector<std::pair<const char*, Points>> sets{{"one point", {{{0.3f, 0.4f}, 1}}},
@@ -292,7 +292,7 @@ TEST_CASE("mixture: training is valid on hostile points") {
       CHECK(isValid(em));
       for (int pass = 0; pass < 30; ++pass) em.update(points);
       CHECK(isValid(em));
-      // From there to something else altogether, and from an untrained mixture.
+      // Continue with very different points, and start with an update of an untrained mixture.
       em.update(wild);
       CHECK(isValid(em));
       StepwiseEm unfitted(components);
@@ -302,7 +302,7 @@ TEST_CASE("mixture: training is valid on hostile points") {
   }
 }
 
-TEST_CASE("mixture: a light too small to resolve is learnt as narrow as allowed, not given up") {
+TEST_CASE("mixture: a light too small to resolve is learnt with the minimum variance") {
   Rng rng(50);
   const Target rest{.background = 1.0f};
   const Vec2 light(0.3f, 0.4f);
@@ -311,7 +311,7 @@ TEST_CASE("mixture: a light too small to resolve is learnt as narrow as allowed,
     Points points = rest.draw(rng, 125);
     points.insert(points.end(), 125, {light, 1});
     pass == 0 ? em.fit(points) : em.update(points);
-    // Half of all light within a hundredth of the disc's radius.
+    // The light has half of the total weight; it must be found within a hundredth of the disc's radius.
     double inside = 0;
     for (const Gaussian& g : em.gaussians())
       if ((g.mean() - light).norm() < 0.01f && g.cov.xx + g.cov.yy < 2e-4f) inside += (1 - em.background()) * g.weight;
@@ -320,7 +320,7 @@ TEST_CASE("mixture: a light too small to resolve is learnt as narrow as allowed,
   CHECK(isValid(em));
 }
 
-TEST_CASE("mixture: the number of components is checked") {
+TEST_CASE("mixture: an invalid number of components is an error") {
   CHECK_THROWS(StepwiseEm(0));
   CHECK_THROWS(StepwiseEm(kMaxIlluminationComponents + 1));
 }

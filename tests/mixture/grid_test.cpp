@@ -1,4 +1,4 @@
-// The grids of directions, against exhaustive search.
+// Direction grids, compared with exhaustive search.
 #include <catch2/catch.hpp>
 
 #include "runtime/core/random.h"
@@ -8,7 +8,7 @@ using namespace lobe;
 
 namespace {
 
-// A third of the directions close to the pole, a third close to the horizon.
+// A third of the directions is close to the pole, another third close to the horizon.
 Vec3 randomDirection(Rng& rng, int i) {
   const float u = rng.uniform(), phi = 6.2831853f * rng.uniform();
   const float z = i % 3 == 0 ? u : i % 3 == 1 ? 1 - 0.01f * u : 0.02f * u;
@@ -24,7 +24,7 @@ double gap(const DirectionGrid& grid, const Vec3& w, const Vec3& entry) {
   return grid.kind == GridKind::elevation ? std::abs(elevationOf(entry) - elevationOf(w)) : (entry - w).norm();
 }
 
-// How much farther the grid's answer is than the nearest entry, at worst.
+// The largest difference between the distance to the grid's answer and to the nearest entry.
 double worstExcess(const DirectionGrid& grid, int queries) {
   std::vector<Vec3> entries;
   entries.reserve(static_cast<std::size_t>(grid.count));
@@ -53,7 +53,7 @@ TEST_CASE("mixture: grids find the nearest direction") {
   }
 }
 
-TEST_CASE("mixture: every grid direction is a unit vector above the horizon and finds itself") {
+TEST_CASE("mixture: every grid direction is a unit vector above the horizon and its own nearest entry") {
   for (const int count : {1, 2, 16, 64, 1024, 4096}) {
     for (const GridKind kind : {GridKind::elevation, GridKind::fibonacci}) {
       const DirectionGrid grid{kind, count};
@@ -67,7 +67,7 @@ TEST_CASE("mixture: every grid direction is a unit vector above the horizon and 
   }
 }
 
-TEST_CASE("mixture: the pole and the horizon have answers") {
+TEST_CASE("mixture: grid look-up works at the pole and at the horizon") {
   for (const int count : {1, 2, 64, 4096}) {
     const DirectionGrid elevations{GridKind::elevation, count}, points{GridKind::fibonacci, count};
     CHECK(elevations.nearest({0, 0, 1}) == 0);

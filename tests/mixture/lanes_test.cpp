@@ -1,4 +1,4 @@
-// The kernels of every instruction set against their definition in double precision.
+// The SIMD kernels of every instruction set, compared with their definitions in double precision.
 #include "tests/support/mixture_test_tools.h"
 
 #include <catch2/catch.hpp>
@@ -11,13 +11,13 @@ using namespace lobe;
 
 namespace {
 
-/// A pair of factors whose components are about as wide, and near to one another.
+/// The two factors of a product; their components have similar widths and are close to each other.
 struct Factors {
   Mixture one, two;
   float constant = 0;
 };
 
-/// Component counts of every remainder of lanes, light on all of one's lobes.
+/// The component counts cover every remainder modulo the vector width.
 Factors randomFactors(Rng& rng, int i, float narrow, float wide) {
   const Vec2 centre(0.8f * rng.uniform() - 0.4f, 0.8f * rng.uniform() - 0.4f);
   Factors f{randomMixture(rng, i % 13, narrow, wide, 3 * narrow, 0.7f),
@@ -33,7 +33,7 @@ Vec2 pointNear(Rng& rng, const Mixture& mixture) {
   return sampleMixture(mixture, rng.uniform(), u);
 }
 
-/// The largest relative error of the product's density at points where it matters.
+/// The largest relative error of the product's density at points sampled from the product.
 double worstDensity(Rng& rng, float narrow, float wide, int runs) {
   double worst = 0;
   for (int i = 0; i < runs; ++i) {
@@ -53,7 +53,7 @@ double worstDensity(Rng& rng, float narrow, float wide, int runs) {
 
 }  // namespace
 
-TEST_CASE("lanes: SSE4 has kernels everywhere") {
+TEST_CASE("lanes: SSE4 kernels exist on every x86-64 machine") {
   CHECK(!kernelTargets().empty());
   const auto names = [&] {
     std::vector<std::string> all;
@@ -65,7 +65,7 @@ TEST_CASE("lanes: SSE4 has kernels everywhere") {
 #endif
 }
 
-TEST_CASE("lanes: packing is lossless, and what lies behind is dead") {
+TEST_CASE("lanes: packing is lossless and padding has zero weight") {
   Rng rng(41);
   const Mixture mixture = randomMixture(rng, 6, 0.01f, 0.5f);
   const Packed packed(mixture, 8);
@@ -80,7 +80,7 @@ TEST_CASE("lanes: packing is lossless, and what lies behind is dead") {
   }
 }
 
-TEST_CASE("lanes: densities of both factors are those of the definition") {
+TEST_CASE("lanes: densities of both factors agree with the definition") {
   onAllTargets([] {
     Rng rng(42);
     for (int i = 0; i < 60; ++i) {
@@ -99,11 +99,11 @@ TEST_CASE("lanes: densities of both factors are those of the definition") {
   });
 }
 
-TEST_CASE("lanes: masses of pairs are those of the definition, down to the least") {
+TEST_CASE("lanes: masses of pairs agree with the definition down to the smallest") {
   onAllTargets([] {
     Rng rng(43);
     for (int i = 0; i < 60; ++i) {
-      // Of both well met and far apart factors.
+      // Both overlapping and distant factors.
       const float narrow = i % 2 == 0 ? 0.05f : 0.02f;
       const Factors f{randomMixture(rng, i % 13, narrow, 0.4f), randomMixture(rng, 1 + i % 8, narrow, 0.4f), 0.1f};
       const Packed one(f.one), two = packedLight(f.two);
@@ -132,7 +132,7 @@ TEST_CASE("lanes: masses of pairs are those of the definition, down to the least
   });
 }
 
-TEST_CASE("lanes: the density of a product keeps its digits, for narrow lobes too") {
+TEST_CASE("lanes: the density of a product is accurate even for narrow lobes") {
   onAllTargets([] {
     Rng rng(44);
     CHECK(worstDensity(rng, 0.05f, 0.4f, 60) < 5e-6);
@@ -141,7 +141,7 @@ TEST_CASE("lanes: the density of a product keeps its digits, for narrow lobes to
   });
 }
 
-TEST_CASE("lanes: the density is the sum over all pairs of the paper") {
+TEST_CASE("lanes: the density agrees with the sum over all pairs of Herholz et al. 2016") {
   Rng rng(45);
   for (int i = 0; i < 10; ++i) {
     const Mixture one = randomMixture(rng, 3, 0.1f, 0.4f), two = randomMixture(rng, 5, 0.1f, 0.4f);
@@ -152,8 +152,8 @@ TEST_CASE("lanes: the density is the sum over all pairs of the paper") {
   }
 }
 
-TEST_CASE("lanes: long thin lobes that cross, lie along and beside one another") {
-  // A thousand times as long as wide: of the determinant of the sum of two such, floats would keep nothing.
+TEST_CASE("lanes: products of elongated lobes that cross or are parallel") {
+  // 300 times as long as wide: the determinant of the sum of two such covariances cancels in single precision.
   onAllTargets([] {
     for (const float angle : {0.0f, 0.3f, 0.78f, 1.5f}) {
       for (const float turn : {0.0f, 1e-3f, 0.1f, 1.3f}) {
@@ -167,12 +167,12 @@ TEST_CASE("lanes: long thin lobes that cross, lie along and beside one another")
   });
 }
 
-TEST_CASE("lanes: a mixture is placed as alignMixture and a turn do") {
+TEST_CASE("lanes: placing a mixture agrees with alignMixture followed by a rotation") {
   onAllTargets([] {
     Rng rng(46);
     for (int i = 0; i < 200; ++i) {
       const int count = 1 + i % 13;
-      // Means outside the disc as well.
+      // Some means are outside the disc.
       const Mixture mixture = randomMixture(rng, count, 0.005f, 0.5f, 1.2f);
       const Packed packed(mixture, paddedCount(count));
       const Alignment alignment{i % 2 == 0 ? GridKind::elevation : GridKind::fibonacci,
@@ -207,7 +207,7 @@ TEST_CASE("lanes: a mixture is placed as alignMixture and a turn do") {
       }
       const Gaussian first = gaussianAt(store.view(), 0);
       CHECK((first.weight == 1 && first.meanX == 0));
-      // What is evaluated is what is sampled: the fields agree with one another.
+      // Fields used for evaluation agree with those used for sampling.
       const float* across = store.view().field(GaussianField::across);
       for (int k = 1; k <= count; ++k) {
         const Gaussian g = gaussianAt(store.view(), k);
@@ -235,7 +235,7 @@ TEST_CASE("lanes: samples of the product follow its density with every instructi
   });
 }
 
-TEST_CASE("lanes: samples of the light follow its density") {
+TEST_CASE("lanes: samples of the illumination mixture follow its density") {
   Rng rng(48);
   const Mixture two = randomMixture(rng, 7, 0.03f, 0.5f);
   const Packed light = packedLight(two);
@@ -247,7 +247,7 @@ TEST_CASE("lanes: samples of the light follow its density") {
         0.01);
 }
 
-TEST_CASE("lanes: all mass outside the disc, and masses about the least") {
+TEST_CASE("lanes: products outside the disc and with masses near the minimum") {
   onAllTargets([] {
     const Mixture one{makeGaussian(1, {1.6f, 0}, 0.05f, 0.05f, 0)}, two{makeGaussian(1, {1.65f, 0.1f}, 0.1f, 0.05f, 1)};
     const OwnedProduct outside(one, 0, two);
@@ -258,7 +258,7 @@ TEST_CASE("lanes: all mass outside the disc, and masses about the least") {
     };
     CHECK(chi2PValue({{1.6f, 0}, 0.4f}, draw, [&](const Vec2& y) { return outside.pdf(y); }) > 0.003);
 
-    // From far over to far under the least mass: none there is, or one whose density is right.
+    // The mass goes from far above to far below the minimum: the product is empty or its density is correct.
     for (float distance = 0.3f; distance < 1.5f; distance += 0.01f) {
       const Mixture a{makeGaussian(0.5f, {-distance / 2, 0.1f}, 0.05f, 0.04f, 0.2f)},
           b{makeGaussian(1, {distance / 2, -0.1f}, 0.04f, 0.05f, 0.1f)};

@@ -1,5 +1,5 @@
-// The disc map, Gaussians and their merging. Formulas that the literature prints wrong are checked together with the
-// printed form, which must fail the same check.
+// The disc map, Gaussians and their merging. Formulas misprinted in the literature are tested together with the printed
+// form, which must fail the same test.
 #include "tests/support/mixture_test_tools.h"
 
 #include <Eigen/Geometry>
@@ -16,7 +16,7 @@ Vec3 randomDirection(Rng& rng) {
   return {s * std::cos(phi), s * std::sin(phi), z};
 }
 
-// A map onto the disc: in the disc, undone by fromDisc, and half the radius holding a quarter of the hemisphere.
+// Whether map goes into the disc, is inverted by fromDisc and maps a quarter of the hemisphere to radii below ½.
 template <class Map>
 bool isEqualAreaMap(const Map& map) {
   Rng rng(1);
@@ -70,7 +70,7 @@ bool isMergeCost(const Cost& cost) {
 
 }  // namespace
 
-TEST_CASE("mixture: the disc map keeps areas and can be undone; the printed one cannot") {
+TEST_CASE("mixture: the disc map preserves areas and is invertible unlike the printed one") {
   CHECK(isEqualAreaMap(toDisc));
   CHECK_FALSE(isEqualAreaMap([](const Vec3& w) -> Vec2 { return w.head<2>() / std::sqrt(1 - w.z()); }));
   CHECK(toDisc({0, 0, 1}).norm() == 0);
@@ -93,7 +93,7 @@ TEST_CASE("mixture: a density over the disc is twice the density over solid angl
   CHECK_FALSE(overSolidAngle == Approx(1).epsilon(1e-3));
 }
 
-TEST_CASE("mixture: the inner loops' exponential is exact to float accuracy and ends in zero") {
+TEST_CASE("mixture: the fast exponential has float accuracy and underflows to zero") {
   double worst = 0;
   for (int i = 0; i < 66000; ++i) {
     const float x = -0.0013178f * static_cast<float>(i);
@@ -105,12 +105,12 @@ TEST_CASE("mixture: the inner loops' exponential is exact to float accuracy and 
   CHECK(expNegative(-std::numeric_limits<float>::infinity()) == 0);
 }
 
-TEST_CASE("mixture: a Gaussian integrates to one, thin and tilted ones too") {
+TEST_CASE("mixture: a Gaussian integrates to one even if elongated and rotated") {
   Rng rng(2);
   for (int i = 0; i < 40; ++i) {
     const float across = 1e-3f * std::pow(300.0f, rng.uniform()), along = across * (1 + 20 * rng.uniform());
     const Gaussian g = makeGaussian(1, {rng.uniform(), rng.uniform()}, along, across, 6 * rng.uniform());
-    // In whitened coordinates the window holds the lobe whatever its shape.
+    // Integrate in whitened coordinates, where the window contains a lobe of any shape.
     const float l11 = std::sqrt(g.cov.xx), l21 = g.cov.xy / l11, l22 = std::sqrt(g.cov.yy - l21 * l21);
     const double mass = l11 * l22 * integrate({{0, 0}, 7}, 60, [&](const Vec2& z) {
                           return normalPdf(g, {g.meanX + l11 * z.x(), g.meanY + l21 * z.x() + l22 * z.y()});
@@ -121,7 +121,7 @@ TEST_CASE("mixture: a Gaussian integrates to one, thin and tilted ones too") {
   CHECK(normalPdf(narrow, {1, 1}) == 0);
 }
 
-TEST_CASE("mixture: samples follow the density; of swapped means they do not") {
+TEST_CASE("mixture: samples follow the density but not that with swapped weights") {
   Rng rng(3);
   for (int i = 0; i < 6; ++i) {
     const Mixture m = randomMixture(rng, 4, 0.02f, 0.3f);
@@ -137,7 +137,7 @@ TEST_CASE("mixture: samples follow the density; of swapped means they do not") {
   }
 }
 
-TEST_CASE("mixture: components of weight zero are never chosen, the largest choice is safe") {
+TEST_CASE("mixture: components of weight zero are never sampled") {
   const Mixture m{makeGaussian(0, {9, 9}, 0.01f, 0.01f, 0), makeGaussian(0.3f, {0.5f, 0}, 0.01f, 0.01f, 0),
                   makeGaussian(0, {9, 9}, 0.01f, 0.01f, 0)};
   for (const float choice : {0.0f, 0.5f, 0x1.fffffep-1f})
@@ -145,7 +145,7 @@ TEST_CASE("mixture: components of weight zero are never chosen, the largest choi
   CHECK(sampleNormal(m[1], {0x1.fffffep-1f, 0}).allFinite());
 }
 
-TEST_CASE("mixture: turning a component turns its density") {
+TEST_CASE("mixture: rotating a component rotates its density") {
   Rng rng(4);
   for (int i = 0; i < 50; ++i) {
     const Gaussian g = randomMixture(rng, 1, 0.05f, 0.4f)[0];
@@ -157,7 +157,7 @@ TEST_CASE("mixture: turning a component turns its density") {
   }
 }
 
-TEST_CASE("mixture: merging keeps weight, mean and second moments") {
+TEST_CASE("mixture: merging preserves weight and mean and second moments") {
   Rng rng(6);
   for (int i = 0; i < 100; ++i) {
     const Mixture pair = randomMixture(rng, 2, 0.01f, 0.5f, 0.9f, 0.7f);
@@ -165,10 +165,10 @@ TEST_CASE("mixture: merging keeps weight, mean and second moments") {
   }
 }
 
-TEST_CASE("mixture: the merge cost is 0 for equals, never negative, free of scale; the printed one is not") {
+TEST_CASE("mixture: the merge cost is zero for equal components and scale-invariant unlike the printed one") {
   CHECK(isMergeCost(mergeCost));
   CHECK_FALSE(isMergeCost(printedCost));
-  // Two round components of half the weight each, a distance d apart: ½ log(1 + d²/(4σ²)).
+  // Two isotropic components with weight ½ at distance d: ½ log(1 + d²/(4σ²)).
   const Gaussian a = makeGaussian(0.5f, {0.1f, 0.2f}, 0.1f, 0.1f, 0),
                  b = makeGaussian(0.5f, {0.4f, -0.2f}, 0.1f, 0.1f, 0);
   CHECK(mergeCost(a, b) == Approx(0.5 * std::log(1 + 0.25 / 0.04)).epsilon(1e-5));

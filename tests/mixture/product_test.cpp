@@ -1,4 +1,4 @@
-// The product of two mixtures. The forms that Herholz et al. 2016 print wrong must fail the checks that ours pass.
+// The product of two mixtures. Formulas misprinted in Herholz et al. 2016 must fail the checks that ours pass.
 #include "tests/support/mixture_test_tools.h"
 
 #include <set>
@@ -40,19 +40,19 @@ TEST_CASE("mixture: the product's mass agrees with quadrature") {
   }
 }
 
-TEST_CASE("mixture: the product's density integrates to one, that of the printed Eq. 9 does not") {
+TEST_CASE("mixture: the product density integrates to one unlike the printed Eq. 9") {
   Rng rng(22);
   for (int i = 0; i < 10; ++i) {
     const Mixture one = randomMixture(rng, 3, 0.05f, 0.4f), two = randomMixture(rng, 5, 0.05f, 0.4f);
     const OwnedProduct product(one, 0, two);
     CHECK(integrate({{0, 0}, 3}, 400, [&](const Vec2& y) { return product.pdf(y); }) == Approx(1).epsilon(1e-4));
-    // Without Z the product would be the normalised mixture itself.
+    // The printed form lacks the normalisation by Z.
     const double printed = integrate({{0, 0}, 3}, 400, [&](const Vec2& y) { return factorsAt(one, 0, two, y); });
     CHECK_FALSE(printed == Approx(1).epsilon(1e-2));
   }
 }
 
-TEST_CASE("mixture: pairs are numbered without collision, as printed they collide") {
+TEST_CASE("mixture: pair indices are unique unlike the printed ones") {
   constexpr std::size_t kOne = 3, kTwo = 5;
   std::set<std::size_t> ours, printed;
   for (std::size_t k1 = 0; k1 < kOne; ++k1) {
@@ -82,9 +82,9 @@ TEST_CASE("mixture: mutants of the product fail the chi² test") {
   const OwnedProduct product(one, 0, two);
   const Window window{{0, 0}, 1.2f};
   CHECK(productPValue(product, window) > 0.01);
-  // No Z.
+  // Without the normalisation by Z.
   CHECK(chi2PValue(window, sampler(product), [&](const Vec2& y) { return factorsAt(one, 0, two, y); }) < 1e-6);
-  // Means weighted by the wrong covariance, which is what swapping the two means does.
+  // Means weighted by the wrong covariances, which is equivalent to swapping the two means.
   const Gaussian narrow = makeGaussian(1, {0.2f, 0}, 0.1f, 0.1f, 0), wide = makeGaussian(1, {0.35f, 0}, 0.3f, 0.2f, 0);
   const Mixture a{narrow}, b{wide};
   const OwnedProduct single(a, 0, b);
@@ -96,7 +96,7 @@ TEST_CASE("mixture: mutants of the product fail the chi² test") {
   CHECK(chi2PValue(window, sampler(single), [&](const Vec2& y) { return swapped.pdf(y); }) < 1e-6);
 }
 
-TEST_CASE("mixture: products of lobes a thousandth wide") {
+TEST_CASE("mixture: products of lobes with standard deviation 0.001") {
   Rng rng(25);
   constexpr int kRuns = 6;
   for (int i = 0; i < kRuns; ++i) {
@@ -109,12 +109,12 @@ TEST_CASE("mixture: products of lobes a thousandth wide") {
   }
 }
 
-TEST_CASE("mixture: factors with means outside the disc, and far from each other") {
+TEST_CASE("mixture: products of factors with means outside the disc or far from each other") {
   const Mixture one{makeGaussian(1, {1.3f, 0.2f}, 0.2f, 0.05f, 0.4f), makeGaussian(1, {-1.2f, 0}, 0.3f, 0.3f, 0)};
   const Mixture two{makeGaussian(0.7f, {-0.5f, 0.5f}, 0.2f, 0.2f, 0), makeGaussian(0.3f, {0.9f, 0}, 0.1f, 0.3f, 1)};
   CHECK(productPValue(OwnedProduct(one, 0, two), {{0, 0}, 1.6f}) > 0.005);
 
-  // 14 standard deviations apart: a mass of about 1e-24, and still a product.
+  // 14 standard deviations apart: the mass is about 1e-24 but the product must still be valid.
   const Mixture left{makeGaussian(1, {-0.5f, 0}, 0.067f, 0.067f, 0)},
       right{makeGaussian(1, {0.5f, 0}, 0.067f, 0.067f, 0)};
   const OwnedProduct distant(left, 0, right);
@@ -123,7 +123,7 @@ TEST_CASE("mixture: factors with means outside the disc, and far from each other
   CHECK(productPValue(distant, {{0, 0}, 0.25f}) > 0.005);
 }
 
-TEST_CASE("mixture: a product that underflows, is empty or not finite has no mass") {
+TEST_CASE("mixture: a product that underflows or is empty or not finite has no mass") {
   const Mixture left{makeGaussian(1, {-0.5f, 0}, 1e-3f, 1e-3f, 0)}, right{makeGaussian(1, {0.5f, 0}, 1e-3f, 1e-3f, 0)};
   CHECK(OwnedProduct(left, 0, right).mass() == 0);
   CHECK(OwnedProduct(Mixture{}, 0, right).mass() == 0);
@@ -132,7 +132,7 @@ TEST_CASE("mixture: a product that underflows, is empty or not finite has no mas
   CHECK(OwnedProduct(left, std::numeric_limits<float>::quiet_NaN(), right).mass() == 0);
 }
 
-TEST_CASE("mixture: a constant reflectance leaves the illumination as it is") {
+TEST_CASE("mixture: the product with a constant reflectance is the illumination mixture") {
   Rng rng(26);
   const Mixture light = randomMixture(rng, 6, 0.02f, 0.4f);
   const OwnedProduct product({}, 0.25f, light);
@@ -144,7 +144,7 @@ TEST_CASE("mixture: a constant reflectance leaves the illumination as it is") {
   }
 }
 
-TEST_CASE("mixture: the largest random numbers choose a pair that has weight") {
+TEST_CASE("mixture: the largest random numbers choose a pair with nonzero weight") {
   const Mixture one{makeGaussian(1, {0, 0}, 0.1f, 0.1f, 0), makeGaussian(0, {0, 0}, 0.1f, 0.1f, 0)};
   const Mixture two{makeGaussian(1, {0, 0}, 0.1f, 0.1f, 0), makeGaussian(0, {50, 50}, 0.1f, 0.1f, 0)};
   const OwnedProduct product(one, 0, two);

@@ -1,4 +1,4 @@
-// Lamps of scene files, in rendered light against closed forms.
+// Emission of area lights in scene files, compared with closed forms.
 
 #include "tests/support/render_test_tools.h"
 #include "tests/support/scenes_test_tools.h"
@@ -8,13 +8,13 @@ using namespace lobe::test;
 
 namespace {
 
-/// The share of the hemisphere's cosine that a rectangle fills above one of its corners at height 1.
+/// Form factor of an a×b rectangle at height 1, from a point below one of its corners.
 double cornerFactor(double a, double b) {
   const double p = std::sqrt(1 + a * a), q = std::sqrt(1 + b * b);
   return (a / p * std::atan(b / p) + b / q * std::atan(a / q)) / (2 * kPi);
 }
 
-/// What a camera sees of a white floor below a corner of a lamp of 2×2 at height 1.
+/// Radiance of a floor of reflectance 0.8 below a corner of a 2×2 lamp at height 1.
 Rgb seenOnFloor(const std::string& radiance) {
   const Scene scene = readBody(
       "<shape type=\"rectangle\"><transform name=\"to_world\"><rotate x=\"1\" angle=\"-90\"/><scale value=\"50\"/>"
@@ -42,9 +42,9 @@ void checkFraction(const Rgb& seen, const Rgb& expected) {
 
 }  // namespace
 
-TEST_CASE("render: a lamp of a spectrum lights a floor in its colour, to half a percent") {
+TEST_CASE("render: a lamp with a spectrum lights a floor in its colour to half a percent") {
   const float fraction = 0.8f * static_cast<float>(cornerFactor(2, 2));
-  // By sums over the observer's table, every nanometre.
+  // Expected values: sums over the CIE observer's table, in steps of one nanometre.
   checkFraction(seenOnFloor("<spectrum name=\"radiance\" value=\"400:0, 500:8, 600:15.6, 700:18.4\"/>"),
                 fraction * Rgb(20.714f, 10.854f, 2.771f));
   checkFraction(seenOnFloor("<spectrum name=\"radiance\" value=\"360:1, 830:1\"/>"),
@@ -52,8 +52,8 @@ TEST_CASE("render: a lamp of a spectrum lights a floor in its colour, to half a 
   checkFraction(seenOnFloor("<rgb name=\"radiance\" value=\"1, 2, 3\"/>"), fraction * Rgb(1, 2, 3));
 }
 
-TEST_CASE("render: a lamp with a texture lights a floor by its squares, to half a percent") {
-  // Squares of 1×1; the nearest and the farthest have one colour. Which of u and v is which does not matter.
+TEST_CASE("render: a lamp with a texture lights a floor to half a percent") {
+  // Squares of 1×1; the nearest and the farthest have the same colour, so swapping u and v changes nothing.
   const double near = cornerFactor(1, 1), beside = cornerFactor(2, 1) - near,
                far = cornerFactor(2, 2) - near - 2 * beside;
   const auto fraction = [](double factor) { return 0.8f * static_cast<float>(factor); };

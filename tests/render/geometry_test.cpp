@@ -1,4 +1,4 @@
-// Ray tracing, hits, cameras.
+// Ray tracing, surface hits and cameras.
 
 #include "runtime/render/film/camera.h"
 #include "tests/support/chi2.h"
@@ -13,7 +13,7 @@ Vec3 randomDirection(Rng& rng) {
   return squareToSphere(rng.uniform2());
 }
 
-// A direction on the given side of a normal.
+// A random direction in the hemisphere around `side`.
 Vec3 randomDirection(Rng& rng, const Vec3& side) {
   const Vec3 d = randomDirection(rng);
   return d.dot(side) < 0 ? Vec3(-d) : d;
@@ -26,7 +26,7 @@ SurfaceHit hitOf(const Scene& scene, const Ray& ray) {
   return *hit;
 }
 
-// Leaves a closed convex shape from points on it: nothing is hit outwards, the far wall is hit inwards.
+// Rays from points on a closed convex shape must hit nothing outwards and the far wall inwards.
 struct Leaks {
   int self = 0, through = 0;
 };
@@ -53,9 +53,9 @@ Leaks leaksOf(const Scene& scene, const Vec3& centre, float size) {
 
 }  // namespace
 
-TEST_CASE("render: rays leave surfaces at any scale") {
+TEST_CASE("render: rays leave surfaces without self-intersection at any scale") {
   const float size = GENERATE(1e-4f, 1e-2f, 1.0f, 1e4f);
-  const float away = GENERATE(0.0f, 30.0f);  // of the coordinates' origin, in units of size
+  const float away = GENERATE(0.0f, 30.0f);  // distance from the origin in units of size
   const Vec3 centre = size * away * Vec3(0.3f, -0.8f, 0.52f);
   CAPTURE(size, away);
   Scene scene;
@@ -88,7 +88,7 @@ TEST_CASE("render: rays leave surfaces at any scale") {
   }
 }
 
-TEST_CASE("render: an offset is small beside the scene") {
+TEST_CASE("render: ray offsets are small compared with the scene") {
   Scene scene;
   addShape(scene, sphereMesh({0, 0, 0}, 1.0f, 12), -1);
   const SurfaceHit hit = hitOf(scene, {Vec3(3, 2, 1), -Vec3(3, 2, 1).normalized()});
@@ -96,7 +96,7 @@ TEST_CASE("render: an offset is small beside the scene") {
   CHECK(hit.offset < 2e-5f);
 }
 
-TEST_CASE("render: light does not pass where boxes touch a floor") {
+TEST_CASE("render: light does not leak through a floor from just below it") {
   Scene scene;
   addShape(scene, rectangle({-5, 0, -5}, {0, 0, 10}, {10, 0, 0}), -1);
   addEmitter(scene, rectangle({-1, -0.01f, -1}, {0, 0, 2}, {2, 0, 0}), 1);  // just below the floor, shining up
@@ -113,7 +113,7 @@ TEST_CASE("render: light does not pass where boxes touch a floor") {
   }
 }
 
-TEST_CASE("render: a hit tells position, sides, coordinates and frame") {
+TEST_CASE("render: a hit has the correct position and normal and uv and frame") {
   Scene scene;
   const int material = addMaterial(scene, std::make_shared<Diffuse>(0.5f));
   SECTION("triangle") {
@@ -163,7 +163,7 @@ TEST_CASE("render: a hit tells position, sides, coordinates and frame") {
   }
 }
 
-TEST_CASE("render: a cylinder is hit from outside, from inside and through its ends") {
+TEST_CASE("render: a cylinder is hit from outside and inside and is open at its ends") {
   Scene scene;
   const int material = addMaterial(scene, std::make_shared<Diffuse>(0.5f));
   const bool flipped = GENERATE(false, true);
@@ -179,12 +179,12 @@ TEST_CASE("render: a cylinder is hit from outside, from inside and through its e
   const RayTracer tracer(scene);
   CHECK_FALSE(tracer.trace({Vec3(1.2f, 2, 0), Vec3(0, 0, 1)}));   // along the axis
   CHECK_FALSE(tracer.trace({Vec3(5, 2, 7.1f), Vec3(-1, 0, 0)}));  // past its end
-  // In by the open end, against the wall from within.
+  // Enters through the open end and hits the wall from inside.
   const SurfaceHit inside = hitOf(scene, {Vec3(1, 2, 2), Vec3(0.3f, 0, 1).normalized()});
   CHECK((inside.position - Vec3(1.5f, 2, 2 + 0.5f / 0.3f)).norm() < 1e-5f);
 }
 
-TEST_CASE("render: a sphere's coordinates turn with its axes") {
+TEST_CASE("render: a sphere's uv coordinates rotate with its axes") {
   Scene scene;
   const Eigen::Matrix3f axes = Eigen::AngleAxisf(0.5f * kPi, Vec3::UnitX()).toRotationMatrix();
   addShape(scene, Sphere{{0, 0, 0}, 1, false, axes}, addMaterial(scene, std::make_shared<Diffuse>(0.5f)));
@@ -197,10 +197,10 @@ TEST_CASE("render: a sphere's coordinates turn with its axes") {
 
 namespace {
 
-/// The mesh where an instance shows it.
+/// The mesh transformed to world space.
 TriangleMesh baked(TriangleMesh mesh, const Eigen::Affine3f& toWorld) {
   for (Vec3& p : mesh.positions) p = toWorld * p;
-  // Not made unit, so that interpolation weighs them as it does in the group's space.
+  // Not normalised, so that interpolation weights them as in the group's space.
   for (Vec3& n : mesh.normals) n = toWorld.linear().inverse().transpose() * n;
   if (toWorld.linear().determinant() < 0)
     for (auto& t : mesh.triangles) std::swap(t[1], t[2]);
@@ -209,7 +209,7 @@ TriangleMesh baked(TriangleMesh mesh, const Eigen::Affine3f& toWorld) {
 
 }  // namespace
 
-TEST_CASE("render: an instance looks as the same mesh put there") {
+TEST_CASE("render: an instance is equivalent to the transformed mesh") {
   Eigen::Affine3f toWorld(Eigen::Translation3f(1, -2, 0.5f) * Eigen::AngleAxisf(0.8f, Vec3(2, 1, 2) / 3) *
                           Eigen::Scaling(2.0f, 0.5f, 1.0f));
   if (GENERATE(false, true)) toWorld = toWorld * Eigen::Scaling(-1.0f, 1.0f, 1.0f);
@@ -224,7 +224,7 @@ TEST_CASE("render: an instance looks as the same mesh put there") {
   instanced.groups[1].shapes = {{"", ball, 0, std::nullopt}, {"", plate, 1, std::nullopt}};
   addShape(instanced, Instance{1, toWorld}, -1);
   const RayTracer a(direct), b(instanced);
-  CHECK((a.bounds().diagonal() - b.bounds().diagonal()).norm() < 2.0f);  // theirs is the box of a box
+  CHECK((a.bounds().diagonal() - b.bounds().diagonal()).norm() < 2.0f);  // instances use the bounding box of a box
   Rng rng(8);
   int hits = 0, differing = 0;
   for (int i = 0; i < 5000; ++i) {
@@ -244,10 +244,10 @@ TEST_CASE("render: an instance looks as the same mesh put there") {
     CHECK(y->bsdf == instanced.materials[y->material].bsdf.get());
   }
   CHECK(hits > 3000);
-  CHECK(differing < 20);  // rays that pass an edge by rounding
+  CHECK(differing < 20);  // rays that miss an edge due to rounding
 }
 
-TEST_CASE("render: a spherical triangle mesh is closed to rays") {
+TEST_CASE("render: rays do not leak out of a spherical mesh") {
   Scene scene;
   addShape(scene, sphereMesh({0, 0, 0}, 1.0f, 40), -1);
   const RayTracer tracer(scene);
@@ -270,7 +270,7 @@ class Tilted : public Diffuse {
 
 }  // namespace
 
-TEST_CASE("render: the frame follows the bump") {
+TEST_CASE("render: the shading frame follows the perturbed normal") {
   Scene scene;
   addShape(scene, rectangle({0, 0, 0}, {0, 0, 4}, {2, 0, 0}), addMaterial(scene, std::make_shared<Tilted>()));
   const SurfaceHit hit = hitOf(scene, {Vec3(0.5f, 2, 3), Vec3(0, -1, 0)});
@@ -283,7 +283,7 @@ TEST_CASE("render: an image is not mirrored") {
   Camera camera;
   camera.width = 200, camera.height = 100, camera.horizontalFov = 90;
   const RayCamera pinhole(camera, {});
-  // Local axes as Mitsuba has them: looking along +z, +x is to the left.
+  // Mitsuba's convention for local axes: the camera looks along +z and +x is to the left.
   CHECK((pinhole.rayThrough({100, 50}).direction - Vec3(0, 0, 1)).norm() < 1e-6f);
   CHECK((pinhole.rayThrough({0, 50}).direction - Vec3(1, 0, 1).normalized()).norm() < 1e-6f);
   CHECK((pinhole.rayThrough({100, 0}).direction - Vec3(0, 0.5f, 1).normalized()).norm() < 1e-6f);
@@ -294,7 +294,7 @@ TEST_CASE("render: an image is not mirrored") {
   CHECK(turned.rayThrough({0, 50}).origin.y() == 7);
 }
 
-TEST_CASE("render: an orthographic camera sees from −1 to 1 of its frame, along one direction") {
+TEST_CASE("render: an orthographic camera covers −1 to 1 of its frame with parallel rays") {
   Camera camera;
   camera.kind = Camera::Kind::orthographic;
   camera.width = 200, camera.height = 100;
@@ -308,7 +308,7 @@ TEST_CASE("render: an orthographic camera sees from −1 to 1 of its frame, alon
   for (int x = 0; x < 200; x += 7) CHECK((rays.sample(x, x / 2, rng).direction - Vec3::UnitZ()).norm() < 1e-6f);
 }
 
-TEST_CASE("render: crop and shift move the film") {
+TEST_CASE("render: crop and shift translate the film") {
   Camera camera;
   camera.width = 200, camera.height = 100;
   camera.kind = GENERATE(Camera::Kind::perspective, Camera::Kind::thinlens, Camera::Kind::orthographic);
@@ -329,7 +329,7 @@ TEST_CASE("render: crop and shift move the film") {
   CHECK(equal(RayCamera(camera, {}).rayThrough(point, lens), whole.rayThrough(point + Vec2(80, 10), lens)));
 }
 
-TEST_CASE("render: a thin lens is sharp in its focus and fills its disc evenly") {
+TEST_CASE("render: a thin lens is sharp at the focus distance and is sampled uniformly") {
   Camera camera;
   camera.kind = Camera::Kind::thinlens;
   camera.width = 200, camera.height = 100;
@@ -361,7 +361,7 @@ TEST_CASE("render: a thin lens is sharp in its focus and fills its disc evenly")
   CHECK(result.passed());
 }
 
-TEST_CASE("render: filters are sampled by their shape") {
+TEST_CASE("render: samples of filters have the moments of the filters") {
   const auto moments = [](const PixelFilter& filter) {
     const FilterSampler sampler(filter);
     Rng rng(2);
@@ -381,7 +381,7 @@ TEST_CASE("render: filters are sampled by their shape") {
   CHECK(deviation(moments({PixelFilter::Kind::tent, 1.0f, 0}), 1.0 / 6) < kMaxDeviation);
   // ∫ x² (g(x) − g(2)) / ∫ (g(x) − g(2)) over [−2, 2] for σ = 0.5.
   CHECK(deviation(moments({PixelFilter::Kind::gaussian, 2.0f, 0.5f}), 0.248571) < kMaxDeviation);
-  // Of the others, where they are positive. Catmull and Rom: 1 − 5/2 x² + 3/2 |x|³ up to 1.
+  // Filters with negative lobes are sampled where they are positive. Catmull–Rom: 1 − 5/2 x² + 3/2 |x|³ up to 1.
   CHECK(deviation(moments({PixelFilter::Kind::mitchell, 2.0f, 0, 0.0f, 0.5f}), 2.0 / 13) < kMaxDeviation);
   const auto second = [](const auto& filter, double radius) {
     double sum = 0, squares = 0;
@@ -400,7 +400,7 @@ TEST_CASE("render: filters are sampled by their shape") {
   CHECK(deviation(moments({PixelFilter::Kind::lanczos, 3.0f, 0}), second(lanczos, 3)) < kMaxDeviation);
 }
 
-TEST_CASE("render: cameras without meaning are refused") {
+TEST_CASE("render: invalid cameras are errors") {
   Camera camera;
   SECTION("field of view") {
     camera.horizontalFov = 180;

@@ -1,4 +1,4 @@
-// What trained illumination is graded on: light against closed forms, and statistics in which noise must cancel.
+// The incident-radiance reference for grading trained illumination, compared with closed forms.
 
 #include <cmath>
 #include <vector>
@@ -18,7 +18,7 @@ double uniformPdf(const Vec3&) {
   return 0.5 * kInvPi;
 }
 
-/// f = cosθ in uniform directions; estimates are 0 or twice as much, at random.
+/// f = cosθ in uniform directions; each estimate is randomly 0 or 2 f.
 IncidentRadiance noisyCosine(int count) {
   std::vector<IncidentRadiance::Sample> samples;
   Rng rng(3);
@@ -42,7 +42,7 @@ Particle particle(const Vec3& position, const Vec3& normal, const Vec3& directio
 
 }  // namespace
 
-TEST_CASE("render: the NEV is that of the light, not of the paths that look at it") {
+TEST_CASE("render: the relative variance excludes the noise of the radiance estimates") {
   const IncidentRadiance light = noisyCosine(200000);
   CHECK(light.irradiance() == Approx(kPi).epsilon(0.02));
   // ∫ cos² / p over π²: 1 for p = cos/π, 4/3 for p = 1/2π.
@@ -52,7 +52,7 @@ TEST_CASE("render: the NEV is that of the light, not of the paths that look at i
   CHECK_FALSE(IncidentRadiance(std::vector<IncidentRadiance::Sample>{}).nev(cosinePdf));
 }
 
-TEST_CASE("render: received light is without what emitter sampling finds") {
+TEST_CASE("render: the incident-radiance reference excludes the part of next-event estimation") {
   Scene scene;
   scene.environment = environment(Image(1, 1, grey(2)));
   addShape(scene, rectangle({-5, -5, 0}, {10, 0, 0}, {0, 10, 0}), addMaterial(scene, std::make_shared<Diffuse>(0.5f)));
@@ -62,16 +62,16 @@ TEST_CASE("render: received light is without what emitter sampling finds") {
   CHECK(density.record() == nullptr);
   CHECK(density.mixture(Vec3::UnitZ()) == Approx(kInvPi));
   const IncidentRadiance light(ready, PathIntegrator(ready, {}), upward(), density, {}, 0);
-  // The share is 1/(1 + (1/4π ÷ cosθ/π)²): 2 · 2π ∫ c / (1 + 1/16c²) dc.
+  // The multiple importance weight is 1/(1 + (1/4π ÷ cosθ/π)²): 2 · 2π ∫ c / (1 + 1/16c²) dc.
   CHECK(light.irradiance() == Approx(2 * 2 * kPi * (0.5 - std::log(17.0) / 32)).epsilon(0.01));
 }
 
-TEST_CASE("render: receivers are found behind mirrors, and nowhere in the void") {
+TEST_CASE("render: receivers are found through mirrors and not where rays escape") {
   Scene scene;
   const int mirror = addMaterial(scene, std::make_shared<HalfMirror>(0.5f, 1.0f, 1.0f));
   const int diffuse = addMaterial(scene, std::make_shared<Diffuse>(0.5f));
   addShape(scene, rectangle({-5, -5, 0}, {10, 0, 0}, {0, 10, 0}), mirror);
-  addShape(scene, rectangle({-5, -5, 3}, {10, 0, 0}, {0, 10, 0}), diffuse);  // seen from below: from behind
+  addShape(scene, rectangle({-5, -5, 3}, {10, 0, 0}, {0, 10, 0}), diffuse);  // seen from its back
   const RenderScene ready(scene);
   const std::optional<Receiver> found = firstReceiver(ready, {{0, 0, 1}, -Vec3::UnitZ()});
   REQUIRE(found);
@@ -80,13 +80,13 @@ TEST_CASE("render: receivers are found behind mirrors, and nowhere in the void")
   CHECK_FALSE(firstReceiver(ready, {{0, 0, 4}, Vec3::UnitZ()}));
 }
 
-TEST_CASE("render: held-out particles are those that a record would learn from") {
+TEST_CASE("render: held-out particles are selected as for training a record") {
   const Vec3 up = Vec3::UnitZ();
   const std::vector<Particle> particles{
       particle({0.3f, 0, 0}, up, up, 1),          // third
       particle({0.1f, 0, 0}, up, up, 1),          // nearest
       particle({0.2f, 0, 0}, up, {1, 0, 1}, 3),   // second
-      particle({0, 0, 0}, Vec3::UnitX(), up, 1),  // another side
+      particle({0, 0, 0}, Vec3::UnitX(), up, 1),  // different normal
       particle({0, 0, 0}, up, {1, 0, -0.1f}, 1),  // from below
       particle({2, 0, 0}, up, up, 1),             // too far
   };

@@ -1,4 +1,4 @@
-// Emitters: sampling, densities, photons.
+// Light sources: sampling, densities and photons.
 
 #include "materials/textures/bitmap.h"
 #include "materials/textures/checkerboard.h"
@@ -12,7 +12,7 @@ using namespace lobe::test;
 
 namespace {
 
-// A sky with a small bright sun.
+// An environment with a small bright sun.
 Image sunnySky() {
   Image image(32, 16);
   for (int y = 0; y < 16; ++y)
@@ -27,7 +27,7 @@ Environment turnedSky() {
   return {sunnySky(), rotation};
 }
 
-// The density of Lights::sample for a direction, by tracing it.
+// The density of Lights::sample for a direction, found by tracing a ray.
 float pdfByTracing(const RenderScene& scene, const Vec3& point, const Vec3& wi) {
   const auto hit = scene.tracer.trace({point, wi});
   return hit ? scene.lights.pdf(point, *hit) : scene.lights.environmentPdf(wi);
@@ -39,7 +39,7 @@ struct LightCase {
   Vec3 point;
 };
 
-// Scenes of which every light is seen from the point and hides no other.
+// Scenes in which every light is visible from the point and occludes no other.
 std::vector<LightCase> lightCases() {
   std::vector<LightCase> cases;
   const auto add = [&](const std::string& name, const Vec3& point) -> Scene& {
@@ -66,7 +66,7 @@ std::vector<LightCase> lightCases() {
 
 }  // namespace
 
-TEST_CASE("render: the density of a light sample is the density of its direction") {
+TEST_CASE("render: the density of a light sample agrees with the density of its direction") {
   for (const LightCase& c : lightCases()) {
     CAPTURE(c.name);
     const RenderScene ready(c.scene);
@@ -79,11 +79,11 @@ TEST_CASE("render: the density of a light sample is the density of its direction
       const float pdf = pdfByTracing(ready, c.point, light->wi);
       differing += std::abs(pdf - light->pdf) > 5e-3f * light->pdf;
     }
-    CHECK(differing <= 10);  // rays that pass an edge by rounding
+    CHECK(differing <= 10);  // rays that miss an edge due to rounding
   }
 }
 
-TEST_CASE("render: light sampling draws what its density says") {
+TEST_CASE("render: light samples follow their density") {
   const std::vector<LightCase> cases = lightCases();
   for (const LightCase& c : cases) {
     const RenderScene ready(c.scene);
@@ -100,7 +100,7 @@ TEST_CASE("render: light sampling draws what its density says") {
   }
 }
 
-TEST_CASE("render: a wrong density of light sampling is found") {
+TEST_CASE("render: a wrong density of light sampling is detected") {
   const LightCase c = lightCases().back();
   const RenderScene ready(c.scene);
   Rng rng(11);
@@ -113,7 +113,7 @@ TEST_CASE("render: a wrong density of light sampling is found") {
   CHECK_FALSE(chi2Sphere(draw, wrong).passed());
 }
 
-TEST_CASE("render: an environment's mean light is its flux, and blocks share it") {
+TEST_CASE("render: environment sampling is unbiased for the whole image and for blocks of it") {
   const EnvironmentLight light(turnedSky());
   Rng rng(6);
   Moments bySample, byBlock, uniform;
@@ -137,16 +137,16 @@ TEST_CASE("render: an environment's mean light is its flux, and blocks share it"
   CHECK(deviation(byBlock, uniform) < kMaxDeviation);
   CHECK(worstSplit < 1e-4);
   CHECK(differing == 0);
-  // Radiance over density hardly varies: that is the point of sampling by importance.
+  // With importance sampling, radiance over density hardly varies.
   CHECK(bySample.error() * std::sqrt(200000.0) < 0.1 * bySample.mean());
   CHECK(light.flux() == Approx(bySample.mean()).epsilon(0.03));
 }
 
-TEST_CASE("render: the environment's image is the right way round") {
+TEST_CASE("render: the environment image has the documented orientation") {
   Image image(8, 4, grey(0));
   image.at(2, 1) = grey(1);
   const EnvironmentLight light(environment(image));
-  // The centre of that pixel, by the contract of scene.h.
+  // The centre of that pixel by the convention in scene.h.
   const float u = 2.5f / 8, v = 1.5f / 4;
   const Vec3 w(std::sin(2 * kPi * u) * std::sin(kPi * v), std::cos(kPi * v),
                -std::cos(2 * kPi * u) * std::sin(kPi * v));
@@ -155,7 +155,7 @@ TEST_CASE("render: the environment's image is the right way round") {
   CHECK(light.radiance(-w).x() == 0);
 }
 
-TEST_CASE("render: what an environment's file has wrong counts as black") {
+TEST_CASE("render: invalid pixels of an environment are black") {
   Image image(2, 2, grey(1));
   image.at(0, 0) = Rgb(std::nanf(""), -1, kInfinity);
   const EnvironmentLight light(environment(image));
@@ -170,7 +170,7 @@ TEST_CASE("render: what an environment's file has wrong counts as black") {
   CHECK(ready.lights.environmentPdf({0, 1, 0}) == 0);
 }
 
-TEST_CASE("render: delta lights have the flux of their closed forms, whatever the scene's size") {
+TEST_CASE("render: the flux of delta lights agrees with closed forms at any scene size") {
   const auto power = [](const DeltaLight& light, float size) {
     Scene scene;
     addShape(scene, Sphere{{0, 0, 0}, size}, -1);
@@ -183,32 +183,31 @@ TEST_CASE("render: delta lights have the flux of their closed forms, whatever th
       const float choice = rng.uniform();
       const Vec2 u1 = rng.uniform2();
       const auto photon = ready.lights.samplePhoton(choice, u1, rng.uniform2());
-      photons.add(photon ? luminance(photon->power) / ready.lights.totalPower() : 0);
+      photons.add(photon ? luminance(photon->power) : 0);
       if (photon) CHECK(photon->emitterDensity == kInfinity);
     }
-    CHECK(deviation(photons, 1) < kMaxDeviation);
-    return ready.lights.totalPower();
+    return photons;
   };
-  CHECK(power(PointLight{{0, 0, 0}, grey(2)}, 1) == Approx(8 * kPi));
+  CHECK(deviation(power(PointLight{{0, 0, 0}, grey(2)}, 1), 8 * kPi) < kMaxDeviation);
   const Vec3 axis = Vec3(1, 2, -2) / 3;
   const auto spot = [&](float cutoff, float beam) { return SpotLight{{0, 0, 0}, axis, grey(2), cutoff, beam}; };
-  CHECK(power(spot(kPi, kPi), 1) == Approx(8 * kPi));
-  CHECK(power(spot(kPi / 3, kPi / 3), 1) == Approx(2 * kPi));
-  CHECK(power(spot(kPi / 2, 0), 1) == Approx(4 * kPi * (1 - 2 / kPi)));
-  CHECK(power(spot(1e-3f, 1e-3f), 1) == Approx(2 * kPi * 1e-6));
-  // Of a texture of which half is black, in the cone's square; and a projector's picture: π × its area × its mean.
+  CHECK(deviation(power(spot(kPi, kPi), 1), 8 * kPi) < kMaxDeviation);
+  CHECK(deviation(power(spot(kPi / 3, kPi / 3), 1), 2 * kPi) < kMaxDeviation);
+  CHECK(deviation(power(spot(kPi / 2, 0), 1), 4 * kPi * (1 - 2 / kPi)) < kMaxDeviation);
+  CHECK(deviation(power(spot(1e-3f, 1e-3f), 1), 2 * kPi * 1e-6) < kMaxDeviation);
+  // A half-black texture over the square around the cone; for a projector the flux is π × image area × mean radiance.
   const TexturePtr board = makeCheckerboard(constantTexture(grey(1)), constantTexture(grey(0)));
   const ProjectedTexture projected{board, axis.unitOrthogonal() * 0.5f, axis.unitOrthogonal().cross(axis) * 0.25f};
   SpotLight textured = spot(kPi / 4, kPi / 4);
   textured.texture = {{board, axis.unitOrthogonal() * 0.5f, axis.unitOrthogonal().cross(axis) * 0.5f}};
-  CHECK(power(textured, 1) == Approx(2 * kPi * (1 - std::sqrt(0.5))));
-  CHECK(power(ProjectorLight{{0, 0, 0}, axis, 3, projected}, 1) == Approx(kPi * 3 * 8 * 0.5));
+  CHECK(deviation(power(textured, 1), 2 * kPi * (1 - std::sqrt(0.5))) < kMaxDeviation);
+  CHECK(deviation(power(ProjectorLight{{0, 0, 0}, axis, 3, projected}, 1), kPi * 3 * 8 * 0.5) < kMaxDeviation);
   const double root3 = std::sqrt(3.0);  // the bounding box's corner
   for (const float size : {1e-9f, 1.0f, 1e15f})
-    CHECK(power(DirectionalLight{axis, grey(2)}, size) == Approx(2 * kPi * std::pow(root3 * size, 2)).epsilon(1e-4));
+    CHECK(deviation(power(DirectionalLight{axis, grey(2)}, size), 2 * kPi * std::pow(root3 * size, 2)) < kMaxDeviation);
 }
 
-TEST_CASE("render: what emitter sampling does alone is not learnt") {
+TEST_CASE("render: light that only next-event estimation samples is not learnt") {
   Scene scene;
   addShape(scene, rectangle({-5, 0, -5}, {0, 0, 10}, {10, 0, 0}), addMaterial(scene, std::make_shared<Diffuse>(0.5f)));
   SECTION("point") {
@@ -225,13 +224,13 @@ TEST_CASE("render: what emitter sampling does alone is not learnt") {
     return ParticleTracer(s, camera, sampler, sampler, nullptr, 1).tracePhotons(0, 2000).radiance.particles();
   };
   CHECK(particles(ready) == 0);
-  addShape(scene, Sphere{{0, 5, 0}, 4}, 0);  // what comes from the floor by way of a sphere is
+  addShape(scene, Sphere{{0, 5, 0}, 4}, 0);  // light reflected between floor and sphere is learnt
   CHECK(particles(RenderScene(scene)) > 10);
 }
 
 namespace {
 
-// A picture of four pixels, one of them black, projected along −y.
+// An image of four pixels, one of them black, projected along −y.
 ProjectedTexture uneven(float perUnit) {
   auto image = std::make_shared<Image>(2, 2, grey(0));
   image->at(1, 0) = grey(1);
@@ -240,7 +239,7 @@ ProjectedTexture uneven(float perUnit) {
   return {makeBitmap(image, {.nearest = true}), Vec3::UnitX() * perUnit, Vec3::UnitZ() * perUnit};
 }
 
-// Photons that reach a disk, against the light that reaches it as seen from its points.
+// Compares the flux of photons that reach a disk with its irradiance from light sampling.
 void checkPhotons(const Scene& emitters) {
   Scene scene = emitters;
   const Disk receiver{{0, 0, 0}, {0, 0, 0.4f}, {0.4f, 0, 0}};
@@ -248,7 +247,7 @@ void checkPhotons(const Scene& emitters) {
   const RenderScene ready(scene);
   const auto receiverShape = static_cast<int>(scene.shapes.size()) - 1;
   Rng rng(9);
-  Moments photons, gathered, power;
+  Moments photons, gathered;
   for (int i = 0; i < 400000; ++i) {
     const float choice = rng.uniform();
     const Vec2 u1 = rng.uniform2();
@@ -256,7 +255,6 @@ void checkPhotons(const Scene& emitters) {
     const auto hit = photon ? ready.tracer.trace(photon->ray) : std::nullopt;
     const bool received = hit && hit->shape == receiverShape && hit->wo.z() > 0;
     photons.add(received ? luminance(photon->power) : 0);
-    power.add(photon ? luminance(photon->power) : 0);
     const Vec2 d = squareToDisk(rng.uniform2());
     const SurfacePoint point = pointOnDisk(receiver, d.x(), d.y());
     const float lightChoice = rng.uniform();
@@ -266,12 +264,11 @@ void checkPhotons(const Scene& emitters) {
   }
   CHECK(photons.mean() > 0);
   CHECK(deviation(photons, gathered) < kMaxDeviation);
-  CHECK(power.mean() == Approx(ready.lights.totalPower()).epsilon(0.03));
 }
 
 }  // namespace
 
-TEST_CASE("render: photons bring the light that is gathered") {
+TEST_CASE("render: photons carry the same flux as light sampling") {
   Scene scene;
   SECTION("rectangle") {
     addEmitter(scene, rectangle({-1, 1, -1}, {2, 0, 0}, {0, 0, 2}), 2);
@@ -316,13 +313,13 @@ TEST_CASE("render: photons bring the light that is gathered") {
   checkPhotons(scene);
 }
 
-TEST_CASE("render: a plane shows the image of a projector, a cone that of a spot") {
-  // 2 in front of the light, looked at along its axis.
+TEST_CASE("render: projectors and textured spot lights project their images") {
+  // The irradiance of a floor at distance 2 below the light.
   const auto irradiance = [](const DeltaLight& light, const Vec3& at) {
     const auto sample = illuminate(light, at);
     return sample ? sample->radiance.x() * sample->wi.y() : 0.0f;
   };
-  // On the plane at distance 1, x and z from −1 to 1 are its edges.
+  // At distance 1 the projected image extends from −1 to 1 in x and z.
   const ProjectorLight projector{{0, 2, 0}, -Vec3::UnitY(), 2, uneven(0.5f)};
   const auto shown = [&](float x, float z) { return irradiance(projector, {x, 0, z}) / kPi; };
   CHECK(shown(-1.9f, -0.1f) == 0);

@@ -1,4 +1,4 @@
-// Mapped normals in pictures, against integrals over the hemisphere.
+// Rendering with normal maps, compared with integrals over the hemisphere.
 
 #include "materials/registry.h"
 #include "tests/support/render_test_tools.h"
@@ -8,7 +8,7 @@ using namespace lobe::test;
 
 namespace {
 
-/// A white floor that faces +z, the tangent along u being +x, under a constant sky of radiance 1.
+/// A floor that faces +z with the tangent +x, under a constant sky of radiance 1.
 struct Floor {
   explicit Floor(BsdfPtr bsdf) {
     addShape(scene, rectangle({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), addMaterial(scene, std::move(bsdf)));
@@ -17,7 +17,7 @@ struct Floor {
   Scene scene;
 };
 
-/// The normal (sin, 0, cos) of an angle from the normal as a map's colour.
+/// A normal map whose normal is tilted by the angle towards +x.
 BsdfPtr mapOf(double degrees, bool flips, bool shadows) {
   const double angle = degrees * std::numbers::pi / 180.0;
   const Rgb colour(static_cast<float>(0.5 + 0.5 * std::sin(angle)), 0.5f,
@@ -31,8 +31,8 @@ BsdfPtr mapOf(double degrees, bool flips, bool shadows) {
   return makeBsdf("normalmap", map);
 }
 
-/// ∫ cosθ/π over the directions above floor and mapped surface, times the shadowing: what a white diffuse surface whose
-/// normal leans by the angle sends back of a sky of radiance 1. Without shadowing (1 + cos) / 2.
+/// The radiance of a white diffuse surface with a normal tilted by the angle under a sky of radiance 1: ∫ cosθ/π times
+/// shadowing over directions above both the floor and the mapped surface. Without shadowing it is (1 + cos) / 2.
 double reflected(double degrees, bool shadows) {
   const double angle = degrees * std::numbers::pi / 180.0;
   const Eigen::Vector3d n(std::sin(angle), 0.0, std::cos(angle));
@@ -48,7 +48,7 @@ double reflected(double degrees, bool shadows) {
   return 2.0 * sum / (static_cast<double>(kSteps) * kSteps);
 }
 
-/// Along a ray that meets the floor's middle from the side that `towards` points to.
+/// Radiance along a ray to the floor's centre from the direction `towards`.
 Moments seenFrom(const Floor& floor, const Vec3& towards) {
   const RenderScene ready(floor.scene);
   return estimate(PathIntegrator(ready, {}), {2.0f * towards, -towards}, 20000);
@@ -59,7 +59,7 @@ const Vec3 kAverted = Vec3(-0.9f, 0.1f, 0.3f).normalized();
 
 }  // namespace
 
-TEST_CASE("render: a mapped normal shows as the hemisphere that it shares with the surface") {
+TEST_CASE("render: the radiance of a normal-mapped surface agrees with numerical integration") {
   for (const double degrees : {0.0, 20.0, 50.0, 75.0})
     for (const bool shadows : {false, true}) {
       INFO(degrees << " degrees, shadowing " << shadows);
@@ -69,12 +69,12 @@ TEST_CASE("render: a mapped normal shows as the hemisphere that it shares with t
     }
 }
 
-TEST_CASE("render: a mapped normal that looks away is black, or looks as its mirror image") {
+TEST_CASE("render: a mapped normal that faces away is black or flipped") {
   CHECK(seenFrom(Floor(mapOf(50.0, false, false)), kAverted).mean() == 0.0);
   CHECK(deviation(seenFrom(Floor(mapOf(50.0, true, true)), kAverted), reflected(50.0, true)) < kMaxDeviation);
 }
 
-TEST_CASE("render: shadowing at the terminator is a factor on value and sample") {
+TEST_CASE("render: shadowing at the terminator scales BSDF values and samples alike") {
   const auto hitOf = [](const Scene& scene) {
     return *RayTracer(scene).trace({Vec3(0.1f, 0.0f, 1.0f), Vec3(0.0f, 0.0f, -1.0f)});
   };

@@ -1,4 +1,4 @@
-// Integrators against closed forms and against each other.
+// Integrators compared with closed forms and with each other.
 
 #include <cstring>
 
@@ -14,7 +14,7 @@ namespace {
 
 constexpr float kAlbedo = 0.6f;
 
-// A floor that faces +y, seen from straight above its middle at the origin.
+// A floor that faces +y; rays look at its centre, the origin.
 Scene floorScene() {
   Scene scene;
   addShape(scene, rectangle({-50, 0, -50}, {0, 0, 100}, {100, 0, 0}),
@@ -32,7 +32,7 @@ double deviationOfDirect(const Scene& scene, double truth) {
   return deviation(directLight(scene), truth);
 }
 
-// The share of the hemisphere's cosine that a rectangle fills above one of its corners at height 1.
+// Form factor of an a×b rectangle at height 1, from a point below one of its corners.
 double cornerFactor(double a, double b) {
   const double p = std::sqrt(1 + a * a), q = std::sqrt(1 + b * b);
   return (a / p * std::atan(b / p) + b / q * std::atan(a / q)) / (2 * kPi);
@@ -40,13 +40,13 @@ double cornerFactor(double a, double b) {
 
 }  // namespace
 
-TEST_CASE("render: direct light has its closed form") {
+TEST_CASE("render: direct light agrees with closed forms") {
   Scene scene = floorScene();
   SECTION("rectangle") {
     addEmitter(scene, rectangle({-1, 1, -2}, {2, 0, 0}, {0, 0, 4}), 3);
     CHECK(deviationOfDirect(scene, kAlbedo * 3 * 4 * cornerFactor(1, 2)) < kMaxDeviation);
   }
-  SECTION("rectangle of which the front is on top") {
+  SECTION("rectangle that faces away") {
     addEmitter(scene, rectangle({-1, 1, -2}, {0, 0, 4}, {2, 0, 0}), 3);
     CHECK(directLight(scene).mean() == 0);
   }
@@ -105,7 +105,7 @@ TEST_CASE("render: direct light has its closed form") {
     scene.lights.push_back(DirectionalLight{Vec3(2, -1, 2) / 3, grey(3)});
     CHECK(directLight(scene).mean() == Approx(kAlbedo / kPi * 3 / 3).epsilon(1e-5));
   }
-  SECTION("delta lights beside others") {
+  SECTION("delta lights together with area lights") {
     addEmitter(scene, rectangle({-1, 1, -2}, {2, 0, 0}, {0, 0, 4}), 3);
     scene.lights.push_back(PointLight{{0, 0.5f, 0}, grey(2)});
     scene.lights.push_back(DirectionalLight{Vec3(3, -4, 0) / 5, grey(1)});
@@ -121,7 +121,7 @@ TEST_CASE("render: direct light has its closed form") {
   }
 }
 
-TEST_CASE("render: a furnace shines as emission over one minus albedo") {
+TEST_CASE("render: the radiance in a furnace is emission over one minus albedo") {
   const float emission = 0.5f;
   Scene scene;
   const int material = addMaterial(scene, std::make_shared<Diffuse>(kAlbedo));
@@ -145,7 +145,7 @@ TEST_CASE("render: a furnace shines as emission over one minus albedo") {
   CHECK(deviation(estimate(PathIntegrator(ready, {}), ray, 20000), emission / (1 - kAlbedo)) < kMaxDeviation);
 }
 
-TEST_CASE("render: what is above for one normal and below for the other is dark") {
+TEST_CASE("render: directions on different sides of the two normals are black") {
   Scene scene;
   TriangleMesh floor = rectangle({-50, 0, -50}, {0, 0, 100}, {100, 0, 0});
   floor.normals.assign(4, Vec3(0.8f, 0.6f, 0));
@@ -160,7 +160,7 @@ TEST_CASE("render: what is above for one normal and below for the other is dark"
   CHECK(seenFrom({-5, -5, 0}) > 0);  // below both
 }
 
-TEST_CASE("render: depth counts segments") {
+TEST_CASE("render: the maximum depth counts path segments") {
   Scene scene;
   addEmitter(scene, Sphere{{0, 0, 0}, 2.0f, true}, 1, addMaterial(scene, std::make_shared<Diffuse>(kAlbedo)));
   const RenderScene ready(scene);
@@ -174,7 +174,7 @@ TEST_CASE("render: depth counts segments") {
 
 namespace {
 
-// Lights of several sizes in a room with a half mirror: every technique matters somewhere.
+// Lights of several sizes in a room with a half mirror, so that every sampling technique matters somewhere.
 Scene roomScene() {
   Scene scene;
   const int wall = addMaterial(scene, std::make_shared<Diffuse>(kAlbedo));
@@ -189,7 +189,7 @@ Scene roomScene() {
 }
 const Ray kLookIntoRoom{Vec3(-1.5f, 1.5f, -1.5f), Vec3(1.8f, -1.0f, 1.4f).normalized()};
 
-// BSDF sampling alone, by the book.
+// A reference path tracer with BSDF sampling only.
 class Naive : public Integrator {
  public:
   explicit Naive(const RenderScene& scene) : scene_(scene) {}
@@ -223,7 +223,7 @@ class Naive : public Integrator {
   const RenderScene& scene_;
 };
 
-// Uniform directions, with the right density or with one that is off by `fault`.
+// Samples uniform directions and reports a density that is wrong by the factor `fault`.
 struct UniformSampler {
   float fault = 1;
   class Vertex {
@@ -235,7 +235,7 @@ struct UniformSampler {
       return BsdfSample{wi, hit_.bsdf->eval(hit_.wo, wi, hit_.uv), density_};
     }
     float pdf(const Vec3& wi) const { return wi.z() * hit_.wo.z() > 0 ? density_ : 0; }
-    // As wrong as can be, yet repeatable: paths are split and ended by it.
+    // A wildly wrong but deterministic estimate, which controls splitting and Russian roulette.
     std::optional<float> reflectedRadiance() const {
       const float wild = std::sin(100 * hit_.position.sum());
       return wild > 0 ? std::optional(std::exp(4 * wild)) : std::nullopt;
@@ -266,7 +266,7 @@ class UniformIntegrator : public Integrator {
 
 }  // namespace
 
-TEST_CASE("render: all ways of sampling estimate the same light") {
+TEST_CASE("render: all sampling techniques estimate the same radiance") {
   const Scene scene = roomScene();
   const RenderScene ready(scene);
   const Moments path = estimate(PathIntegrator(ready, {}), kLookIntoRoom, 100000);
@@ -277,7 +277,7 @@ TEST_CASE("render: all ways of sampling estimate the same light") {
   CHECK(deviation(path, estimate(UniformIntegrator(ready, 1.1f), kLookIntoRoom, 100000, 9)) > kMaxDeviation);
 }
 
-TEST_CASE("render: splitting and ending paths by what is expected of them changes no mean, however wrong that is") {
+TEST_CASE("render: adjoint-driven Russian roulette and splitting is unbiased for any estimate") {
   const Scene scene = roomScene();
   const RenderScene ready(scene);
   const Moments path = estimate(PathIntegrator(ready, {}), kLookIntoRoom, 100000);
@@ -292,7 +292,7 @@ TEST_CASE("render: splitting and ending paths by what is expected of them change
   CHECK(split.segments > 2 * plain.segments);
 }
 
-TEST_CASE("render: an image depends on the seed, not on threads or waves") {
+TEST_CASE("render: an image depends on the seed but not on threads or waves") {
   Scene scene = roomScene();
   const RenderScene ready(scene);
   Camera camera;
@@ -315,7 +315,7 @@ TEST_CASE("render: an image depends on the seed, not on threads or waves") {
     return std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(Rgb)) == 0;
   };
   const Image one = image(1, 5);
-  // Sample s of pixel i has its own random stream, whatever the wave that it came in.
+  // Sample s of pixel i has its own random stream, independent of the wave.
   Film byHand(camera.width, camera.height);
   PathStatistics statistics;
   for (int s = 0; s < 7; ++s) {
@@ -328,7 +328,7 @@ TEST_CASE("render: an image depends on the seed, not on threads or waves") {
   CHECK_FALSE(equal(one, image(1, 6)));
 }
 
-TEST_CASE("render: a deadline is kept") {
+TEST_CASE("render: the time limit is met") {
   Scene scene = roomScene();
   const RenderScene ready(scene);
   Camera camera;
@@ -345,7 +345,7 @@ TEST_CASE("render: a deadline is kept") {
   CHECK(waves > 5);
 }
 
-TEST_CASE("render: options without meaning are refused") {
+TEST_CASE("render: invalid render options are errors") {
   RenderOptions options;
   CHECK_THROWS_WITH(options.validate(), Catch::Contains("samples"));
   options.samples = 0;

@@ -1,4 +1,4 @@
-// Scenes of any size, and ellipses.
+// Rendering of scenes of any size, and of ellipses.
 
 #include <fmt/format.h>
 
@@ -17,7 +17,7 @@ constexpr int kSamples = 16;
 
 using Picture = std::vector<Rgb>;
 
-/// Pixels as means of equal random numbers for all scenes.
+/// Renders the scene with the same random numbers for all scenes.
 Picture pictureOf(const Scene& scene) {
   const RenderScene ready(scene);
   const RayCamera camera(scene.camera, scene.filter);
@@ -49,7 +49,7 @@ double difference(const Picture& a, const Picture& b) {
   return sum / static_cast<double>(a.size()) / meanOf(b);
 }
 
-/// A room of side 2 around the origin, in units of scale: lamps of each kind, and shapes of each kind.
+/// A room with edges of length 2·scale around the origin, with lamps and shapes of each kind.
 class Room {
  public:
   explicit Room(double scale, bool pointLight = true) : scale_(scale) {
@@ -69,7 +69,7 @@ class Room {
         "<rotate y=\"1\" angle=\"30\"/><translate x=\"0.4\" y=\"-0.8\" z=\"0\"/><scale "
         "value=\"{}\"/></transform></shape>",
         scale);
-    // Its intensity grows with the square of lengths.
+    // Its intensity scales with the square of lengths.
     if (pointLight)
       body_ += fmt::format(
           "<emitter type=\"point\"><point name=\"position\" x=\"{}\" y=\"{}\" z=\"{}\"/><rgb name=\"intensity\" "
@@ -111,7 +111,7 @@ const std::string kFromAbove =
     "<sensor type=\"orthographic\"><transform name=\"to_world\"><lookat origin=\"0,0,5\" target=\"0,0,0\" "
     "up=\"0,1,0\"/></transform></sensor>";
 
-/// With semi-axes 1.5 along x and 0.5 along z, which are not u and v.
+/// An ellipse with semi-axes 1.5 along x and 0.5 along z, which differ from u and v.
 Disk ellipseAbove(float height) {
   const float c = std::cos(0.8f), s = std::sin(0.8f);
   return {{0, height, 0}, {1.5f * c, 0, 0.5f * s}, {-1.5f * s, 0, 0.5f * c}};
@@ -119,7 +119,7 @@ Disk ellipseAbove(float height) {
 
 }  // namespace
 
-TEST_CASE("render: the picture does not depend on the unit of length, however small or large") {
+TEST_CASE("render: the image does not depend on the unit of length") {
   const Picture usual = pictureOf(Room(1).read());
   CHECK(meanOf(usual) > 0.1);
   for (const double scale : {3e-10, 1e-10, 1e-6, 1e-3, 1e3, 1e6, 1e10, 1e14}) {
@@ -128,7 +128,7 @@ TEST_CASE("render: the picture does not depend on the unit of length, however sm
   }
 }
 
-TEST_CASE("render: rooms too small for squares of floats are drawn, too") {
+TEST_CASE("render: scenes so small that squared lengths underflow are rendered") {
   const Picture usual = pictureOf(Room(1, false).read());
   for (const double scale : {1e-19, 1e-30}) {
     CAPTURE(scale);
@@ -136,7 +136,7 @@ TEST_CASE("render: rooms too small for squares of floats are drawn, too") {
   }
 }
 
-TEST_CASE("render: a camera scaled with its scene sees the same") {
+TEST_CASE("render: a camera scaled together with its scene renders the same image") {
   const auto picture = [](const std::string& type, const std::string& scale) {
     const std::string whole = "<scale value=\"" + scale + "\"/></transform>";
     return pictureOfText(
@@ -155,7 +155,7 @@ TEST_CASE("render: a camera scaled with its scene sees the same") {
   }
 }
 
-TEST_CASE("render: scenes of ordinary size are left as they are") {
+TEST_CASE("render: scenes of ordinary size are not rescaled") {
   CHECK(Room(1).read().scale == 1);
   CHECK(Room(1e3).read().scale == 1);
   CHECK(Room(1e-10).read().scale == 0x1p32f);
@@ -181,7 +181,7 @@ TEST_CASE("render: bumps have the same height when a scene is scaled") {
   CHECK(lengthOf(tiny, 1e-10f) == Approx(1e-10f * lengthOf(plain, 1)));
 }
 
-TEST_CASE("render: what is too small to be seen harms nothing") {
+TEST_CASE("render: shapes too small to be visible do no harm") {
   const std::string sky = "<emitter type=\"constant\"/>";
   const std::string group =
       "<shape type=\"shapegroup\" id=\"g\"><shape type=\"cube\"/><shape type=\"sphere\"/></shape>";
@@ -195,7 +195,7 @@ TEST_CASE("render: what is too small to be seen harms nothing") {
   }
 }
 
-TEST_CASE("render: the groups of instances may be of any size") {
+TEST_CASE("render: groups of instances may have any size") {
   const auto picture = [](const std::string& inGroup, const std::string& inWorld) {
     return pictureOfText(
         "<emitter type=\"constant\"/><shape type=\"shapegroup\" id=\"g\"><shape type=\"sphere\"><float "
@@ -212,7 +212,7 @@ TEST_CASE("render: the groups of instances may be of any size") {
   CHECK(difference(picture("0.8e14", "1e-14"), usual) < 0.01);
 }
 
-TEST_CASE("render: a ray meets an ellipse within its edge, with a disk's coordinates") {
+TEST_CASE("render: rays hit an ellipse inside its edge with the uv coordinates of a disk") {
   // Conjugate radii that are not orthogonal, in a tilted plane.
   const Disk ellipse{{1, 2, 3}, {2, 0, 1}, {1.5f, 0.5f, 0}};
   const Eigen::Vector3d normal = ellipse.u.cross(ellipse.v).cast<double>().normalized();
@@ -239,7 +239,7 @@ TEST_CASE("render: a ray meets an ellipse within its edge, with a disk's coordin
   CHECK((hit->normal - normal.cast<float>()).norm() < 1e-5f);
 }
 
-TEST_CASE("render: an ellipse lights a floor as its closed form says") {
+TEST_CASE("render: irradiance from an ellipse agrees with its closed form") {
   CHECK(areaOf(ellipseAbove(1)) == Approx(kPi * 0.75));
   Scene scene;
   addShape(scene, rectangle({-50, 0, -50}, {0, 0, 100}, {100, 0, 0}),
@@ -248,14 +248,14 @@ TEST_CASE("render: an ellipse lights a floor as its closed form says") {
   addEmitter(scene, ellipseAbove(height), 3);
   const RenderScene ready(scene);
   const Ray ray{Vec3(1, 0.5f, 0), Vec3(-1, -0.5f, 0).normalized()};
-  // Seen from a point below the centre, an ellipse of semi-axes a and b fills this share of the projected hemisphere:
+  // Form factor of an ellipse with semi-axes a and b, from a point below its centre:
   const double h2 = height * height;
   const double fraction = 1.5 * 0.5 / std::sqrt((h2 + 2.25) * (h2 + 0.25));
   CHECK(deviation(estimate(PathIntegrator(ready, {2}), ray, 40000), 0.6 * 3 * fraction) < kMaxDeviation);
 }
 
 TEST_CASE("render: a scene shows a disk under a non-uniform scale as an ellipse") {
-  // Black where the ellipse of semi-axes 0.4 and 0.8 hides the sky: π·0.32 of an area of 4.
+  // The black ellipse with semi-axes 0.4 and 0.8 covers π·0.32 of the visible area of 4.
   const Picture picture = pictureOfText(
       "<emitter type=\"constant\"/><shape type=\"disk\"><transform name=\"to_world\"><scale x=\"0.4\" y=\"0.8\"/>"
       "</transform><bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"0\"/></bsdf></shape>",

@@ -1,4 +1,4 @@
-// Training where light is scarce, lopsided or in strange places: what is rendered with it has to be right all the same.
+// Rendering must stay unbiased after training in scenes with little, uneven or extreme light.
 
 #include <algorithm>
 #include <array>
@@ -58,7 +58,7 @@ TrainingPlan smallPlan(TrainFrom from) {
   return plan;
 }
 
-/// A scene made ready, with its training.
+/// A scene with its trained illumination.
 struct Trial {
   Trial(Scene s, const TrainingPlan& plan)
       : scene(std::move(s)),
@@ -107,13 +107,13 @@ void checkRecords(const Trial& trial) {
     if (pass.logLikelihood) CHECK(std::isfinite(*pass.logLikelihood));
 }
 
-/// No sample was dropped as being negative or not finite, and none is too large to be added up.
+/// Checks that no sample was negative or not finite and that all pixels are finite.
 void checkFilm(const Film& film) {
   CHECK(film.dropped() == 0);
   for (const Rgb& pixel : film.mean().pixels) REQUIRE((pixel.allFinite() && pixel.minCoeff() >= 0));
 }
 
-/// Trains by every source and renders; the pictures have to be those of the path tracer.
+/// Trains from every source and renders; the images must agree with the path tracer.
 void checkUnbiased(const Scene& scene, int samples, const std::function<void(TrainingPlan&)>& change = {}) {
   std::vector<Block> truth;
   for (const TrainFrom from : kSources) {
@@ -133,7 +133,7 @@ bool isBlack(const Film& film) {
   return std::ranges::all_of(film.mean().pixels, [](const Rgb& pixel) { return (pixel == 0).all(); });
 }
 
-/// Trains by every source: nothing is to be learnt, and nothing to be seen.
+/// Trains from every source; the rendered image must be black.
 void checkBlack(const Scene& scene, const std::function<void(TrainingPlan&)>& change = {}) {
   for (const TrainFrom from : kSources) {
     TrainingPlan plan = smallPlan(from);
@@ -146,7 +146,7 @@ void checkBlack(const Scene& scene, const std::function<void(TrainingPlan&)>& ch
 
 }  // namespace
 
-TEST_CASE("stability: too few particles to learn from") {
+TEST_CASE("stability: training with too few particles") {
   const int photons = GENERATE(1, 3, 50);
   checkUnbiased(roomScene(), 64, [&](TrainingPlan& plan) {
     plan.photons = photons;
@@ -156,7 +156,7 @@ TEST_CASE("stability: too few particles to learn from") {
   });
 }
 
-TEST_CASE("stability: hardly any time to train") {
+TEST_CASE("stability: training with almost no time") {
   checkUnbiased(roomScene(), 64, [](TrainingPlan& plan) { plan.seconds = 1e-9; });
   TrainingPlan plan = smallPlan(TrainFrom::both);
   plan.seconds = 1e-9;
@@ -166,19 +166,19 @@ TEST_CASE("stability: hardly any time to train") {
   CHECK(hurried.cache().size() > 0);
 }
 
-TEST_CASE("stability: where no photon arrives there is no record") {
+TEST_CASE("stability: no records where no photon arrives") {
   Scene scene;
   addShape(scene, rectangle({-2, 0, -2}, {0, 0, 4}, {4, 0, 0}), addDiffuse(scene, 0.6f));
   scene.camera = lookAt({0, 2, -2}, {0, 0, 0}, 60);
   SECTION("no light at all") {}
-  SECTION("a lamp that shines away") {
+  SECTION("a lamp that faces away") {
     addEmitter(scene, rectangle({-1, 3, -1}, {0, 0, 2}, {2, 0, 0}), 3);
   }
-  SECTION("lamps below, under a floor of two sides") {
+  SECTION("lamps below a two-sided floor") {
     addEmitter(scene, rectangle({-1, -1, -1}, {0, 0, 2}, {2, 0, 0}), 1e6f);
     scene.lights.push_back(PointLight{{0, -0.01f, 0}, grey(10)});
   }
-  SECTION("nothing to see") {
+  SECTION("no geometry") {
     scene.shapes.clear();
     scene.lights.push_back(PointLight{{0, 1, 0}, grey(1)});
   }
@@ -189,7 +189,7 @@ TEST_CASE("stability: where no photon arrives there is no record") {
   }
 }
 
-TEST_CASE("stability: an enclosed dark room, light all around it") {
+TEST_CASE("stability: a closed dark room with light outside") {
   Scene scene;
   addShape(scene, box({-2, 0, -2}, {2, 3, 2}, true), addDiffuse(scene, 0.97f));
   scene.camera = lookAt({1.6f, 1.6f, -1.8f}, {-0.4f, 0.8f, 0.6f}, 60);
@@ -200,7 +200,7 @@ TEST_CASE("stability: an enclosed dark room, light all around it") {
 }
 
 TEST_CASE("stability: all light from one point") {
-  // A small white disc, shaded from the room by nothing, is all that the lamp next to it reaches.
+  // A small lamp above a diffuse floor in a black room.
   Scene scene;
   const int black = addDiffuse(scene, 0.0f), floor = addDiffuse(scene, 0.7f);
   addShape(scene, box({-2, 0, -2}, {2, 3, 2}, true), black);
@@ -209,7 +209,7 @@ TEST_CASE("stability: all light from one point") {
   addEmitter(scene, Disk{{0, 2, 0}, {size, 0, 0}, {0, 0, size}, false}, 1 / (size * size));
   scene.camera = lookAt({1.6f, 1.6f, -1.8f}, {0, 0, 0}, 60);
   SECTION("direct") {}
-  SECTION("in a mirror, where emitter sampling finds nothing") {
+  SECTION("in a mirror where next-event estimation finds nothing") {
     addShape(scene, Disk{{0, 0.5f, 0}, {1.5f, 0, 0}, {0, 0, 1.5f}},
              addMaterial(scene, std::make_shared<HalfMirror>(0.3f, 0.4f, 0.5f)));
   }
@@ -219,14 +219,14 @@ TEST_CASE("stability: all light from one point") {
 TEST_CASE("stability: all light at grazing angles") {
   Scene scene;
   addShape(scene, rectangle({-2, 0, -2}, {0, 0, 4}, {4, 0, 0}), addDiffuse(scene, 0.8f));
-  // A strip at the floor's edge that looks along it, and one much lower.
+  // A light strip at the edge of the floor, facing along the floor; the second one is much lower.
   const float height = GENERATE(0.02f, 1e-3f);
   addEmitter(scene, rectangle({-2, 0, -2}, {0, height, 0}, {0, 0, 4}), 1 / height, addDiffuse(scene, 0.5f));
   scene.camera = lookAt({1.6f, 1.6f, -1.8f}, {0, 0, 0}, 60);
   checkUnbiased(scene, 64);
 }
 
-TEST_CASE("stability: the unit of length makes no difference") {
+TEST_CASE("stability: training does not depend on the unit of length") {
   const Trial usual(roomScene(), smallPlan(TrainFrom::both));
   const auto truth = blocks(usual.path(128), 3);
   for (const float scale : {1e-4f, 1e4f}) {
@@ -240,7 +240,7 @@ TEST_CASE("stability: the unit of length makes no difference") {
   }
 }
 
-TEST_CASE("stability: the winding makes no difference to surfaces of two sides") {
+TEST_CASE("stability: training on two-sided surfaces does not depend on their winding") {
   const Trial usual(roomScene(), smallPlan(TrainFrom::both));
   const Scene flipped = roomScene(1, true);
   checkUnbiased(flipped, 48);
@@ -265,26 +265,26 @@ Scene twoRooms(float left, float right) {
 
 }  // namespace
 
-TEST_CASE("stability: light behind a thin wall stays there") {
-  SECTION("with none on the side in view") {
+TEST_CASE("stability: light does not leak through a thin wall") {
+  SECTION("no light on the visible side") {
     const Scene scene = twoRooms(1e4f, 0);
     checkBlack(scene);
     const Trial trial(scene, smallPlan(TrainFrom::photons));
-    // The floor goes on under the wall, and what is learnt there is learnt from both sides: but no farther away.
+    // The floor continues under the wall and learns from both sides there, but only close to the wall.
     CHECK_FALSE(trial.cache().find({0, 1, 0}, Vec3::UnitX()));
     const float unit =
         smallPlan(TrainFrom::photons).records.unitFraction * trial.ready.tracer.bounds().diagonal().norm();
     for (const IlluminationRecord& r : trial.cache().records())
       CHECK((std::abs(r.normal.x()) < 0.5f && r.position.x() < unit));
   }
-  SECTION("with all of it in view") {
+  SECTION("all light on the visible side") {
     Scene scene = twoRooms(1, 0);
     scene.camera = lookAt({-1.9f, 1, 0}, {0, 1, 0.1f}, 70);
     const Trial trial(std::move(scene), smallPlan(TrainFrom::photons));
     CHECK(trial.cache().find({0, 1, 0}, -Vec3::UnitX()));
     CHECK_FALSE(trial.cache().find({0, 1, 0}, Vec3::UnitX()));
   }
-  SECTION("with little on the side in view") {
+  SECTION("little light on the visible side") {
     const Scene scene = twoRooms(1e3f, 1);
     checkUnbiased(scene, 96);
   }
@@ -294,18 +294,18 @@ TEST_CASE("stability: a corridor of forty bounces") {
   Scene scene;
   const int wall = addDiffuse(scene, 0.95f);
   addShape(scene, box({-0.5f, 0, 0}, {0.5f, 1, 20}, true), wall);
-  for (int i = 1; i < 10; ++i)  // baffles, left and right in turn
+  for (int i = 1; i < 10; ++i)  // baffles, alternately left and right
     addShape(scene, rectangle({i % 2 ? -0.5f : -0.1f, 0, 2.0f * i}, {0.6f, 0, 0}, {0, 1, 0}), wall);
   addEmitter(scene, rectangle({-0.5f, 0, 19.9f}, {0, 1, 0}, {1, 0, 0}), 100, wall);
   scene.camera = lookAt({0, 0.5f, GENERATE(0.1f, 10.1f)}, {0, 0.5f, 30}, 60);
   checkUnbiased(scene, 32);
 }
 
-TEST_CASE("stability: a lamp a million times brighter than the one in view") {
+TEST_CASE("stability: a lamp a million times brighter than the visible one") {
   checkUnbiased(twoRooms(1e6f, 1), 128);
 }
 
-TEST_CASE("stability: training gives the same bytes on any number of threads") {
+TEST_CASE("stability: training does not depend on the number of threads") {
   const Scene scene = roomScene();
   const auto train = [&](TrainFrom from, std::size_t threads) {
     const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism, threads);

@@ -1,5 +1,5 @@
-// The estimators of training agree: photons with photons that importance guides, photons with camera paths, and all of
-// them with closed forms.
+// The estimators of training agree: unguided with importance-guided photons, photons with camera paths, and all of them
+// with closed forms.
 
 #include <functional>
 #include <vector>
@@ -16,10 +16,10 @@ namespace {
 
 constexpr float kAlbedo = 0.5f;
 
-/// The bin that a particle counts in; negative: none.
+/// The bin of a particle; negative if none.
 using Binning = std::function<int(const Particle&)>;
 
-/// Flux by bin, each photon one estimate.
+/// Flux per bin; each photon is one estimate.
 std::vector<Moments> photonFlux(const RenderScene& scene, const GuidedSampler& importance, int count,
                                 std::uint64_t seed, int bins, const Binning& binOf) {
   std::vector<Moments> moments(bins);
@@ -38,7 +38,7 @@ std::vector<Moments> photonFlux(const RenderScene& scene, const GuidedSampler& i
   return moments;
 }
 
-/// A square of the floor y = 0 about the middle, with the side it is lit from.
+/// A square around the centre of the floor y = 0, lit from above.
 struct Patch {
   float half = 0.5f;
 
@@ -58,7 +58,7 @@ struct Patch {
   }
 };
 
-/// Flux on the patch by bin, from what camera paths find that start on it: L cosθ over the direction's density, times
+/// Flux on the patch per bin from camera paths that start on it: L cosθ divided by the density of the direction, times
 /// the area.
 std::vector<Moments> pathFlux(const RenderScene& scene, const GuidedSampler& sampler, const Patch& patch, int count,
                               std::uint64_t seed) {
@@ -70,7 +70,7 @@ std::vector<Moments> pathFlux(const RenderScene& scene, const GuidedSampler& sam
     ImportonResult result;
     ImportonWalk(scene, sampler, wishes, rng, result).run({Vec3(u.x(), 0.01f, u.y()), -Vec3::UnitY()}, 0);
     const std::vector<Particle>& samples = dataOf(result.radiance).samples;
-    // Paths may come by again: only what the first vertex received is spread evenly over the patch.
+    // Paths may return to the patch, but only first vertices are uniform on it.
     const bool found = !samples.empty() && (samples[0].position - Vec3(u.x(), 0, u.y())).norm() < 1e-4f;
     const int bin = found ? patch.bin(samples[0]) : -1;
     for (int b = 0; b < static_cast<int>(moments.size()); ++b)
@@ -101,7 +101,7 @@ BsdfPtr dielectric(const char* type) {
   return makeBsdf(type, parameters);
 }
 
-/// A room with a lamp that shines at the ceiling only: nothing on the floor is lit directly.
+/// A room with a lamp that lights only the ceiling, so the floor has no direct light.
 Scene roomScene() {
   Scene scene;
   const int wall = addMaterial(scene, std::make_shared<Diffuse>(kAlbedo));
@@ -139,8 +139,8 @@ RayCamera roomCamera() {
   Camera camera;
   camera.width = camera.height = 16;
   camera.horizontalFov = 40;
-  camera.toWorld.block<3, 4>(0, 0) << 1, 0, 0, 0, 0, 0, -1, 2.9f, 0, 1, 0,
-      0;  // from the ceiling, at the floor's middle
+  // From the ceiling towards the centre of the floor.
+  camera.toWorld.block<3, 4>(0, 0) << 1, 0, 0, 0, 0, 0, -1, 2.9f, 0, 1, 0, 0;
   return {camera, {}};
 }
 
@@ -152,7 +152,7 @@ struct Unguided {
 
 }  // namespace
 
-TEST_CASE("training: guided photons bring the same light as others, with less noise") {
+TEST_CASE("training: guided photons estimate the same flux as unguided ones with less noise") {
   Scene scene = roomScene();
   addShape(scene, Sphere{{0.9f, 0.6f, 0.4f}, 0.5f}, addMaterial(scene, std::make_shared<HalfMirror>(0.4f, 0.5f, 0.5f)));
   const RenderScene ready(scene);
@@ -168,17 +168,17 @@ TEST_CASE("training: guided photons bring the same light as others, with less no
   const auto all = [&](const Particle& p) { return patch.contains(p) ? 0 : -1; };
   const Moments one = photonFlux(ready, unguided.sampler, 60000, 3, 1, all)[0];
   const Moments other = photonFlux(ready, guides.importanceSampler, 60000, 4, 1, all)[0];
-  CHECK(other.error() < 0.9 * one.error());  // 0.77 as measured
+  CHECK(other.error() < 0.9 * one.error());  // 0.77 in our measurement
 }
 
-TEST_CASE("training: camera paths and photons see the same light from the same directions") {
+TEST_CASE("training: camera paths and photons agree on the directional distribution of light") {
   Scene scene = roomScene();
   SECTION("indirect") {}
-  SECTION("by way of a half mirror") {
+  SECTION("via a half mirror") {
     const int mirror = addMaterial(scene, std::make_shared<HalfMirror>(0.4f, 0.5f, 0.5f));
     addShape(scene, Sphere{{-1.2f, 2.6f, 0.4f}, 0.35f}, mirror);
   }
-  SECTION("and with a delta light, of which the direct part counts for neither") {
+  SECTION("with a delta light whose direct part is excluded") {
     scene.lights.push_back(PointLight{{0.5f, 1, 0.2f}, grey(2)});
   }
   SECTION("through smooth water") {
@@ -198,19 +198,19 @@ TEST_CASE("training: camera paths and photons see the same light from the same d
   CHECK(agree(photons, pathFlux(ready, guides.radianceSampler, patch, 30000, 3)));
 }
 
-TEST_CASE("training: in an integrating sphere all estimators have the closed form") {
+TEST_CASE("training: all estimators agree with the closed form in an integrating sphere") {
   const float radius = 2, intensity = 3;
   Scene scene;
   addShape(scene, Sphere{{0, 0, 0}, radius, true}, addMaterial(scene, std::make_shared<Diffuse>(kAlbedo)));
   scene.lights.push_back(PointLight{{0, 0, 0}, grey(intensity)});
   const RenderScene ready(scene);
   const Unguided unguided(scene);
-  // Without the direct part, which is emitter sampling's alone.
+  // Without direct light, which only next-event estimation samples.
   const double irradiance = intensity / (radius * radius) * kAlbedo / (1 - kAlbedo);
   const double area = 4 * kPi * radius * radius;
   const auto flux = photonFlux(ready, unguided.sampler, 50000, 1, 1, [](const Particle&) { return 0; });
   CHECK(deviation(flux[0], irradiance * area) < kMaxDeviation);
-  // Every vertex of every path is an estimate; those without a sample are zero. Paths are what is independent.
+  // Every vertex of every path is an estimate, zero if it has no sample. Only different paths are independent.
   Moments excess;
   for (int i = 0; i < 50000; ++i) {
     Rng rng(2, 0, i);
@@ -225,15 +225,15 @@ TEST_CASE("training: in an integrating sphere all estimators have the closed for
 
 namespace {
 
-/// Says that its albedo is 1, whatever it is: particles then survive with any weight.
+/// Reports an albedo of 1 whatever the true albedo, so that particles survive with any weight.
 class Boaster : public Diffuse {
  public:
   using Diffuse::Diffuse;
   Rgb albedo(const Vec3&, const Vec2&) const override { return grey(1.0f); }
 };
 
-/// Light that leaves a floor of which only `albedo` is reflected, and what its five walls make of it: flux per albedo
-/// and per flux that the floor receives.
+/// Flux reflected by a floor of this albedo and then by the five walls, divided by the albedo and by the flux that the
+/// floor receives.
 Moments fluxFromFloor(float albedo, float walls) {
   Scene scene;
   addShape(scene, box({-1, -1, -1}, {1, 1, 1}, true), addMaterial(scene, std::make_shared<Diffuse>(walls)));
@@ -249,13 +249,13 @@ Moments fluxFromFloor(float albedo, float walls) {
 
 }  // namespace
 
-TEST_CASE("training: the weight window keeps the light, whatever it splits or ends") {
+TEST_CASE("training: the weight window is unbiased for particles of any weight") {
   for (const float albedo : {40.0f, 3.0f, 0.5f, 1e-4f, 1e-8f}) {
     const Moments flux = fluxFromFloor(albedo, 0);
     INFO("albedo " << albedo << ": " << flux.mean() << " +- " << flux.error());
     CHECK(deviation(flux, 1) < kMaxDeviation);
   }
-  // Behind the first wall a photon of 1e-8 is one of a hundred.
+  // With an albedo of 1e-8 only about one photon in a hundred survives the first wall.
   const Moments kept = fluxFromFloor(1e-4f, kAlbedo), ended = fluxFromFloor(1e-8f, kAlbedo);
   INFO(kept.mean() << " +- " << kept.error() << ", " << ended.mean() << " +- " << ended.error());
   CHECK(kept.mean() > 1.5);

@@ -1,4 +1,4 @@
-// Files with several faults, files of older versions, and encodings: what is reported, and what is read all the same.
+// Files with several faults, files for older versions, and encodings: what is reported, and what is read nevertheless.
 
 #include <fmt/format.h>
 #include <catch2/catch.hpp>
@@ -15,7 +15,7 @@ SceneCheck check(const std::string& text, bool lenientReading = false) {
   return checkScene(folder.write("test.xml", text), options);
 }
 
-/// From an older renderer, that passes over what it does not know.
+/// A scene for an older renderer, which ignores unknown parameters.
 std::string oldSceneOf(const std::string& body) {
   return "<scene version=\"0.6.0\">\n" + body + "\n" + kSensor + "\n</scene>\n";
 }
@@ -33,7 +33,7 @@ std::string utf16(const std::string& ascii, bool bigEndian, bool mark) {
 
 }  // namespace
 
-TEST_CASE("scenes: all faults of a file are reported in one run, in groups") {
+TEST_CASE("scenes: all faults of a file are reported in one run and grouped by kind") {
   std::string body;
   for (int i = 0; i < 12; ++i) body += fmt::format("<shape type=\"torus{}\"/>\n", i);
   for (int i = 0; i < 5; ++i) body += "<shape type=\"knot\"/>\n";
@@ -51,7 +51,7 @@ TEST_CASE("scenes: all faults of a file are reported in one run, in groups") {
              Catch::EndsWith("18 faults of 14 kinds; --check shows the other 4; --lenient reads what can be read"));
 }
 
-TEST_CASE("scenes: lenient reading gets past every fault that leaves something to draw") {
+TEST_CASE("scenes: lenient reading tolerates every fault that leaves something to draw") {
   const TestFolder folder;
   folder.write("broken.ply", "ply\nformat ascii 1.0\n");
   folder.write("broken.png", "not a picture");
@@ -96,7 +96,7 @@ TEST_CASE("scenes: lenient reading gets past every fault that leaves something t
   }
 }
 
-TEST_CASE("scenes: lenient reading does without a parameter that is out of range") {
+TEST_CASE("scenes: lenient reading ignores a parameter that is out of range") {
   const auto alphaOf = [](const std::string& alpha) {
     const Scene scene = readBody(
         "<shape type=\"sphere\"><bsdf type=\"roughconductor\"><string name=\"distribution\" "
@@ -107,7 +107,7 @@ TEST_CASE("scenes: lenient reading does without a parameter that is out of range
   };
   CHECK(alphaOf("<float name=\"alpha\" value=\"-1\"/>") == alphaOf(""));
   CHECK(alphaOf("<float name=\"alpha\" value=\"0.4\"/>") != alphaOf(""));
-  // The sky that is read again without its bad parameter is there once.
+  // The sky is read again without its invalid parameter, but added only once.
   const auto skyOf = [](const std::string& scale) {
     return readBody("<emitter type=\"sunsky\"><integer name=\"resolution\" value=\"16\"/>" + scale + "</emitter>",
                     lenient())
@@ -117,13 +117,13 @@ TEST_CASE("scenes: lenient reading does without a parameter that is out of range
   CHECK(skyOf("<float name=\"sun_scale\" value=\"-1\"/>") == skyOf(""));
 }
 
-TEST_CASE("scenes: with nothing left to draw, lenient reading fails as well") {
+TEST_CASE("scenes: lenient reading fails when nothing is left to draw or there is no sensor") {
   CHECK_THAT(faultOf("<shape type=\"torus\"/>", lenient()), Catch::Contains("torus"));
   CHECK_THAT(faultOfText("<scene version=\"3.0.0\"><shape type=\"sphere\"/></scene>", lenient()),
              Catch::Contains("no <sensor>") && !Catch::Contains("--lenient"));
 }
 
-TEST_CASE("scenes: a check tells whether a scene can be read, and does not throw") {
+TEST_CASE("scenes: checkScene reports whether a scene can be read and does not throw") {
   CHECK(check(sceneOf("<shape type=\"sphere\"/>")).readable);
   CHECK(!check(sceneOf("<shape type=\"sphere\"/><shape type=\"torus\"/>")).readable);
   CHECK(check(sceneOf("<shape type=\"sphere\"/><shape type=\"torus\"/>"), true).readable);
@@ -133,7 +133,7 @@ TEST_CASE("scenes: a check tells whether a scene can be read, and does not throw
   CHECK(check(sceneOf("<integrator type=\"volpath\"/><shape type=\"sphere\"/>")).notes.size() == 1);
 }
 
-TEST_CASE("scenes: left-over parameters are passed over in old files and named in new ones") {
+TEST_CASE("scenes: unused parameters cause a warning in old files and a fault in new ones") {
   const std::string body =
       "<shape type=\"sphere\"><bsdf type=\"conductor\"><string name=\"material\" value=\"Al\"/>"
       "<float name=\"alpha\" value=\"0.1\"/></bsdf></shape>";
@@ -144,7 +144,7 @@ TEST_CASE("scenes: left-over parameters are passed over in old files and named i
   CHECK_THAT(faultOf(body), Catch::Contains("\"alpha\"") && Catch::Contains("--lenient"));
 }
 
-TEST_CASE("scenes: of a parameter that is given twice the last one is used") {
+TEST_CASE("scenes: the last value of a repeated parameter is used") {
   const std::string body =
       "<shape type=\"sphere\"><bsdf type=\"diffuse\"><float name=\"reflectance\" value=\"0.2\"/>"
       "<float name=\"reflectance\" value=\"0.7\"/></bsdf></shape>";
@@ -156,7 +156,7 @@ TEST_CASE("scenes: of a parameter that is given twice the last one is used") {
   }
 }
 
-TEST_CASE("scenes: a file whose name differs by case or slashes is found when there is only one") {
+TEST_CASE("scenes: a file whose name differs in case or slashes is found when it is the only one") {
   const TestFolder folder;
   std::filesystem::create_directory(folder.path() / "Parts");
   folder.write("Parts/Ball.xml", "<scene version=\"3.0.0\"><shape type=\"sphere\"/></scene>");
@@ -167,14 +167,14 @@ TEST_CASE("scenes: a file whose name differs by case or slashes is found when th
     const Scene scene = read(name);
     CHECK(scene.shapes.size() == 1);
     REQUIRE(scene.warnings.size() == 1);
-    CHECK_THAT(scene.warnings[0], Catch::Contains("test.xml:2:1") && Catch::Contains("Parts/Ball.xml is taken for it"));
+    CHECK_THAT(scene.warnings[0], Catch::Contains("test.xml:2:1") && Catch::Contains("Parts/Ball.xml is used instead"));
   }
   CHECK(read("Parts/Ball.xml").warnings.empty());
   folder.write("Parts/BALL.xml", "<scene version=\"3.0.0\"/>");
   CHECK_THROWS_WITH(read("Parts/ball.xml"), Catch::Contains("no file"));
 }
 
-TEST_CASE("scenes: files in other encodings are read, alone and included in each other") {
+TEST_CASE("scenes: files in other encodings are read alone and included in each other") {
   const TestFolder folder;
   const std::string latin1 =
       "<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?>\n<scene version=\"3.0.0\"><!-- Gr\xf6\xdf"
@@ -201,13 +201,13 @@ TEST_CASE("scenes: files in other encodings are read, alone and included in each
   }
 }
 
-TEST_CASE("scenes: an encoding that is not known or not kept is a fault of the file") {
+TEST_CASE("scenes: an unknown or violated encoding is a fault of the file") {
   CHECK_THAT(faultOfText("<?xml version='1.0' encoding='klingon'?><scene/>"),
              Catch::Contains("test.xml:1:1") && Catch::Contains("\"klingon\" is not known"));
-  CHECK_THAT(faultOfText(std::string("\xff\xfe<\0s\0\x00\xd8", 8)), Catch::Contains("this is not UTF-16LE"));
+  CHECK_THAT(faultOfText(std::string("\xff\xfe<\0s\0\x00\xd8", 8)), Catch::Contains("encoding UTF-16LE"));
 }
 
-TEST_CASE("scenes: small files that would multiply without end are refused") {
+TEST_CASE("scenes: small files that would expand exponentially are rejected") {
   const std::string sphere = "<shape type=\"sphere\"/>";
   std::string values = "<default name=\"a0\" value=\"0123456789\"/>";
   for (int i = 1; i < 40; ++i) values += fmt::format("<default name=\"a{}\" value=\"$a{}$a{}\"/>", i, i - 1, i - 1);
@@ -222,9 +222,9 @@ TEST_CASE("scenes: small files that would multiply without end are refused") {
     }
     return body + sphere;
   };
-  CHECK_THAT(faultOf(chain("bsdf", "blendbsdf", "diffuse", 2)), Catch::Contains("more than 1000 bsdfs nested in one"));
+  CHECK_THAT(faultOf(chain("bsdf", "blendbsdf", "diffuse", 2)), Catch::Contains("more than 1000 nested bsdfs"));
   CHECK_THAT(faultOf(chain("texture", "checkerboard", "checkerboard", 2)),
-             Catch::Contains("more than 1000 textures nested in one"));
+             Catch::Contains("more than 1000 nested textures"));
   CHECK(faultOf(chain("bsdf", "twosided", "diffuse", 1)).empty());
 
   std::string deep;
@@ -243,7 +243,7 @@ TEST_CASE("scenes: small files that would multiply without end are refused") {
   CHECK_THROWS_WITH(readScene(folder.path() / "0.xml"), Catch::Contains("more than 1000 <include>s"));
 }
 
-TEST_CASE("scenes: integrators say how long paths are and whether emitters are seen") {
+TEST_CASE("scenes: integrators set the maximum depth and the visibility of emitters") {
   const auto read = [](const std::string& version, const std::string& integrator) {
     return readText("<scene version=\"" + version + "\">" + integrator + kSensor + "</scene>");
   };
@@ -256,7 +256,7 @@ TEST_CASE("scenes: integrators say how long paths are and whether emitters are s
   CHECK(read("0.6.0", hide).emitterVisibility == EmitterVisibility::dark);
 }
 
-TEST_CASE("scenes: clip planes are read and have to leave something between them") {
+TEST_CASE("scenes: clip planes are read and must be in order") {
   const auto cameraOf = [](const std::string& planes) {
     return readText("<scene version=\"3.0.0\"><sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/>" +
                     planes + "</sensor></scene>")
@@ -271,7 +271,7 @@ TEST_CASE("scenes: clip planes are read and have to leave something between them
                     Catch::Contains("far_clip"));
 }
 
-TEST_CASE("scenes: what fails because of a fault is no fault of its own") {
+TEST_CASE("scenes: consequences of a fault are not reported as further faults") {
   const auto faults = [](const std::string& body) { return check(sceneOf(body + "<shape type=\"cube\"/>")).faults; };
   CHECK(faults("<shape type=\"instance\"><ref id=\"nobody\"/></shape>").size() == 1);
   CHECK(faults("<bsdf type=\"mask\"><ref id=\"nobody\"/></bsdf>").size() == 1);
@@ -279,7 +279,7 @@ TEST_CASE("scenes: what fails because of a fault is no fault of its own") {
   CHECK(faults("<bsdf type=\"mask\"/>").size() == 1);
 }
 
-TEST_CASE("scenes: a fault is counted once however many files are included after it") {
+TEST_CASE("scenes: a fault is counted once although files are included after it") {
   const TestFolder folder;
   folder.write("part.xml", "<scene version=\"3.0.0\"/>");
   const std::string include = "<include filename=\"part.xml\"/>";
@@ -289,7 +289,7 @@ TEST_CASE("scenes: a fault is counted once however many files are included after
   CHECK(found.faults[0].count == 1);
 }
 
-TEST_CASE("scenes: slips in the integrators we know are faults; the first of several integrators counts") {
+TEST_CASE("scenes: unknown parameters of known integrators are faults and the first integrator is used") {
   CHECK_THAT(faultOf("<integrator type=\"path\"><integer name=\"max_dpeth\" value=\"3\"/></integrator>"),
              Catch::Contains("did you mean max_depth?") && Catch::Contains("--lenient"));
   CHECK(faultOf("<integrator type=\"guided_path\"><integer name=\"budget\" value=\"3\"/></integrator>").empty());
@@ -302,7 +302,7 @@ TEST_CASE("scenes: slips in the integrators we know are faults; the first of sev
   CHECK_THAT(loose.warnings[0], Catch::Contains("strict normals are always on"));
 }
 
-TEST_CASE("scenes: a saturated spectrum that reflects at most all light has no component over 1") {
+TEST_CASE("scenes: a saturated reflectance spectrum with values up to 1 has no component over 1") {
   const auto colour = [](const std::string& points) {
     return albedoOf(readBody("<shape type=\"sphere\"><bsdf type=\"diffuse\"><spectrum name=\"reflectance\" value=\"" +
                              points + "\"/></bsdf></shape>"),
@@ -314,7 +314,7 @@ TEST_CASE("scenes: a saturated spectrum that reflects at most all light has no c
   CHECK(colour("360:2, 830:2").x() == Approx(2.0f).epsilon(1e-3));
 }
 
-TEST_CASE("scenes: lenient reading says when nothing is left") {
+TEST_CASE("scenes: lenient reading reports when nothing is left") {
   CHECK_THAT(faultOf("<shape type=\"torus\"/>", lenient()), Catch::Contains("nothing is left to draw"));
 }
 

@@ -1,4 +1,4 @@
-// Colours, spectra, textures and lights in scene files of both dialects: the values they come to.
+// Values of colours, spectra, textures and lights in scene files of both dialects.
 
 #include <numbers>
 
@@ -16,7 +16,7 @@ std::string ofVersion(const std::string& version, const std::string& body) {
   return "<scene version=\"" + version + "\">\n" + body + "\n" + kSensor + "\n</scene>\n";
 }
 
-/// What an emitter with this radiance sends out.
+/// The emission of an emitter with this radiance.
 Rgb radianceOf(const std::string& element, const std::string& version = "3.0.0") {
   return readText(ofVersion(version, "<emitter type=\"constant\">" + element + "</emitter>"))
       .environment->radiance.at(0, 0);
@@ -34,7 +34,7 @@ void checkNear(const Rgb& value, const Rgb& expected, float tolerance = 1e-3f) {
   CHECK((value - expected).abs().maxCoeff() <= tolerance * expected.maxCoeff());
 }
 
-/// Two pixels in a row.
+/// A row of two pixels.
 std::string blackAndWhite() {
   return rowPng(std::string("\0\0\0\xff\xff\xff", 6), 3);
 }
@@ -47,7 +47,7 @@ std::string named(const std::string& name, const std::string& element, const std
 
 }  // namespace
 
-TEST_CASE("scenes: emission spectra are seen as they are, reflectances in daylight where Mitsuba does so") {
+TEST_CASE("scenes: reflectance spectra are weighted by daylight as in Mitsuba and emission spectra are not") {
   const std::string even = "value=\"300:1, 900:1\"/>", ramp = "value=\"360:0, 830:1\"/>";
   const auto emitted = [](const std::string& value, const std::string& version) {
     return radianceOf(named("radiance", "spectrum", value), version);
@@ -55,7 +55,7 @@ TEST_CASE("scenes: emission spectra are seen as they are, reflectances in daylig
   const auto reflected = [](const std::string& value, const std::string& version) {
     return reflectanceOf(named("reflectance", "spectrum", value), version);
   };
-  // By sums over the tables of observer and daylight, every nanometre.
+  // Sums over the tables of observer and daylight, every nanometre.
   const Rgb rampSeen(0.7055f, 0.3707f, 0.1498f), rampReflected(0.6009f, 0.3894f, 0.1720f);
   for (const std::string version : {"0.6.0", "2.0.0", "3.5.0"}) {
     CAPTURE(version);
@@ -68,7 +68,7 @@ TEST_CASE("scenes: emission spectra are seen as they are, reflectances in daylig
   }
 }
 
-TEST_CASE("scenes: a black body is the same as its curve") {
+TEST_CASE("scenes: a black body equals its tabulated spectrum") {
   // Planck's law at 4500 K in W/(m² sr nm), every 10 nm.
   std::string wavelengths, values, pairs;
   for (int nm = 360; nm <= 830; nm += 10) {
@@ -99,7 +99,7 @@ TEST_CASE("scenes: a black body is the same as its curve") {
   }
 }
 
-TEST_CASE("scenes: spectra and textures with a type go by the type, whatever the element is called") {
+TEST_CASE("scenes: the type of a spectrum or texture matters and not the name of its element") {
   const auto radiance = [](const std::string& element, const std::string& rest) {
     return radianceOf(named("radiance", element, rest + "</" + element + ">"));
   };
@@ -117,7 +117,7 @@ TEST_CASE("scenes: spectra and textures with a type go by the type, whatever the
                        "<float name=\"value\" value=\"3\"/></spectrum>"),
               grey(3.0f), 0);
   }
-  // As reflectances, in other textures, by reference, and for lights that take colours only.
+  // As reflectances, in other textures, by reference, and for lights that accept colours only.
   checkNear(reflectanceOf("<texture name=\"reflectance\" type=\"irregular\"><string name=\"wavelengths\" "
                           "value=\"300, 900\"/><string name=\"values\" value=\"0.4, 0.4\"/></texture>"),
             grey(0.4f));
@@ -132,7 +132,7 @@ TEST_CASE("scenes: spectra and textures with a type go by the type, whatever the
   checkNear(std::get<DirectionalLight>(scene.lights.at(1)).irradiance, grey(1.0f), 0);
 }
 
-TEST_CASE("scenes: bitmaps under other names, and daylight in front of them") {
+TEST_CASE("scenes: bitmaps in colour elements and nested in d65") {
   const TestFolder folder;
   folder.write("a.png", blackAndWhite());
   const auto radiance = [&](const std::string& element) {
@@ -150,7 +150,7 @@ TEST_CASE("scenes: bitmaps under other names, and daylight in front of them") {
   CHECK(scaled->eval(Vec2(0.75f, 0.5f)).x() == 4.0f);
 }
 
-TEST_CASE("scenes: faults of spectra with a type are told at their place") {
+TEST_CASE("scenes: faults of spectra with a type are reported with their location") {
   const auto fault = [](const std::string& rest) {
     return faultOf("<emitter type=\"constant\">\n<spectrum name=\"radiance\" " + rest + "</spectrum></emitter>");
   };
@@ -162,10 +162,10 @@ TEST_CASE("scenes: faults of spectra with a type are told at their place") {
                    "<string name=\"values\" value=\"1\"/>"),
              Catch::Contains("a value for each"));
   CHECK_THAT(fault("type=\"d56\">"), Catch::Contains("unknown texture type \"d56\"; did you mean d65?"));
-  CHECK_THAT(fault("type=\"checkerboard\">"), Catch::StartsWith("test.xml:3:1: ") && Catch::Contains("a colour"));
+  CHECK_THAT(fault("type=\"checkerboard\">"), Catch::StartsWith("test.xml:3:1: ") && Catch::Contains("type colour"));
 }
 
-TEST_CASE("scenes: a checkerboard of numbers is the other way round in Mitsuba 2 and 3") {
+TEST_CASE("scenes: a checkerboard of numbers has its squares exchanged in Mitsuba 2 and 3") {
   const auto board = [](const std::string& name) {
     return "<texture name=\"" + name +
            "\" type=\"checkerboard\"><float name=\"color0\" value=\"0.9\"/>"
@@ -187,7 +187,7 @@ TEST_CASE("scenes: a checkerboard of numbers is the other way round in Mitsuba 2
   for (const std::string version : {"0.6.0", "2.0.0", "3.0.0"}) {
     CAPTURE(version);
     const bool today = version != "0.6.0";
-    const float first = today ? 0.1f : 0.9f;  // of numbers, where colours have 0.9
+    const float first = today ? 0.1f : 0.9f;  // of numbers; colours have 0.9
     CHECK(reflectanceOf(board("reflectance"), version, same).x() == Approx(0.9f));
     CHECK(reflectanceOf(board("reflectance"), version, mixed).x() == Approx(0.1f));
     CHECK(albedo(version, blend + board("weight") + "</bsdf>", same) == Approx(first));
@@ -197,7 +197,7 @@ TEST_CASE("scenes: a checkerboard of numbers is the other way round in Mitsuba 2
   }
 }
 
-TEST_CASE("scenes: textured roughness has its squares where Mitsuba has them") {
+TEST_CASE("scenes: textured roughness has the same squares as in Mitsuba") {
   const auto peak = [](const std::string& version, const std::string& type, const std::string& alpha, const Vec2& uv) {
     const Scene scene =
         readText(ofVersion(version, "<shape type=\"sphere\"><bsdf type=\"" + type + "\">" + alpha + "</bsdf></shape>"));
@@ -216,7 +216,7 @@ TEST_CASE("scenes: textured roughness has its squares where Mitsuba has them") {
                                    {"roughplastic", "alpha"}}) {
     CAPTURE(type);
     const Vec2 same(0.75f, 0.75f);
-    // Textured roughplastic takes tables by its mean roughness: near is enough to tell the squares apart.
+    // Textured roughplastic selects tables by its mean roughness, so the tolerance only distinguishes the squares.
     CHECK(peak("3.0.0", type, board(name), same) ==
           Approx(peak("3.0.0", type, number(name, "0.2"), same)).epsilon(0.05));
     CHECK(peak("0.6.0", type, board(name), same) ==
@@ -224,7 +224,7 @@ TEST_CASE("scenes: textured roughness has its squares where Mitsuba has them") {
   }
 }
 
-TEST_CASE("scenes: bitmaps by channel") {
+TEST_CASE("scenes: bitmaps are read by channel") {
   const TestFolder folder;
   folder.write("a.png", rowPng("\xff\x99\x33\x66", 4));
   const auto value = [&](const std::string& channel, const std::string& file = "a.png") {
@@ -250,7 +250,7 @@ TEST_CASE("scenes: bitmaps by channel") {
   checkNear(value("y", "b.png"), grey(0.5f));
 }
 
-TEST_CASE("scenes: a PNG's own gamma counts in files for Mitsuba 0.6") {
+TEST_CASE("scenes: the gamma of a PNG file is used in files for Mitsuba 0.6") {
   const TestFolder folder;
   folder.write("a.png", rowPng("\x80\x80\x80", 3, chunk("gAMA", bigEndian(100000))));
   const auto value = [&](const std::string& version, const std::string& more) {
@@ -272,7 +272,7 @@ TEST_CASE("scenes: a PNG's own gamma counts in files for Mitsuba 0.6") {
   CHECK(value("3.0.0", "<boolean name=\"raw\" value=\"true\"/>") == Approx(linear));
 }
 
-TEST_CASE("scenes: spots with a texture, and projectors") {
+TEST_CASE("scenes: spots with a texture and projectors") {
   const std::string place =
       "<transform name=\"to_world\"><lookat origin=\"0 0 4\" target=\"0 0 0\" up=\"0 1 0\"/></transform>";
   const std::string board =
@@ -286,14 +286,14 @@ TEST_CASE("scenes: spots with a texture, and projectors") {
                                board + "</emitter>");
   const auto& spot = std::get<SpotLight>(scene.lights.at(0));
   REQUIRE(spot.texture);
-  // The edge of the cone, 20° from the axis towards the frame's +x, which is the camera's left, the world's −x.
+  // The edge of the cone, 20° from the axis towards +x of the frame: to the left of the camera, −x of the world.
   const float tangent = std::tan(20 * std::numbers::pi_v<float> / 180);
   CHECK(spot.texture->uvOf(spot.direction, Vec3(-tangent, 0, -1)).isApprox(Vec2(1, 0.5f), 1e-5f));
   CHECK(spot.texture->uvOf(spot.direction, Vec3(0, -tangent, -1)).isApprox(Vec2(0.5f, 0), 1e-5f));
   const auto& projector = std::get<ProjectorLight>(scene.lights.at(1));
   CHECK(projector.scale == 3.0f);
   CHECK(projector.position == Vec3(0, 0, 4));
-  // The picture stands upright for a viewer behind it: its first pixel on the left and on top.
+  // The image is upright for a viewer behind the projector: its first pixel is at the top left.
   CHECK((projector.image.uvOf(projector.direction, Vec3(-0.999f, 0.999f, -1)) - Vec2(0, 0)).norm() < 1e-3f);
   CHECK((projector.image.uvOf(projector.direction, Vec3(0.999f, -0.999f, -1)) - Vec2(1, 1)).norm() < 1e-3f);
 
@@ -312,7 +312,7 @@ TEST_CASE("scenes: spots with a texture, and projectors") {
       Catch::Contains("below 90 degrees"));
 }
 
-TEST_CASE("scenes: what nothing samples does not shine, other weights do not matter") {
+TEST_CASE("scenes: a point light with a sampling_weight of 0 is left out and other weights have no effect") {
   const auto lights = [](const std::string& weight) {
     return readBody("<emitter type=\"point\"><float name=\"sampling_weight\" value=\"" + weight + "\"/></emitter>");
   };
@@ -321,10 +321,10 @@ TEST_CASE("scenes: what nothing samples does not shine, other weights do not mat
   const Scene none = lights("0");
   CHECK(none.lights.empty());
   REQUIRE(none.warnings.size() == 1);
-  CHECK_THAT(none.warnings[0], Catch::Contains("test.xml:2:23: ") && Catch::Contains("nothing finds this light"));
+  CHECK_THAT(none.warnings[0], Catch::Contains("test.xml:2:23: ") && Catch::Contains("is never sampled"));
   CHECK_THAT(faultOf("<emitter type=\"point\"><float name=\"sampling_weight\" value=\"-1\"/></emitter>"),
              Catch::Contains("must not be negative"));
-  // Rays find an area light without being sent there.
+  // Rays hit an area light without next-event estimation.
   const Scene area = readBody(
       "<shape type=\"sphere\"><emitter type=\"area\"><float name=\"sampling_weight\" value=\"0\"/>"
       "</emitter></shape>");

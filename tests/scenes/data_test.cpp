@@ -1,4 +1,4 @@
-// Whole scenes: our own, and those that nobody here made (LOBE_DATA names their folder).
+// Complete scenes: our own, and third-party ones (the environment variable LOBE_DATA names their folder).
 
 #include <algorithm>
 #include <cstdlib>
@@ -34,7 +34,7 @@ void checkConsistent(const Scene& scene) {
   CHECK(scene.warnings.empty());
 }
 
-/// nullptr, after a warning, when the data is not there.
+/// nullptr, after a warning, if there is no data.
 const char* dataFolder() {
   const char* folder = std::getenv("LOBE_DATA");
   if (!folder) WARN("LOBE_DATA is not set: skipped");
@@ -43,7 +43,7 @@ const char* dataFolder() {
 
 }  // namespace
 
-TEST_CASE("scenes: our own jewelry") {
+TEST_CASE("scenes: the jewelry scene is read") {
   const Scene scene = readScene(LOBE_SOURCE_DIR "/scenes/jewelry.xml");
   checkConsistent(scene);
   CHECK(scene.shapes.size() == 15);
@@ -55,7 +55,7 @@ TEST_CASE("scenes: our own jewelry") {
   CHECK(scene.filter.kind == PixelFilter::Kind::box);
 }
 
-TEST_CASE("scenes: measured materials in our own scenes") {
+TEST_CASE("scenes: measured materials are read in our own scenes") {
   const char* folder = dataFolder();
   if (!folder) return;
   const auto [type, file] = GENERATE(std::pair{"measured", "paper_white_rgb"}, std::pair{"merl", "pink-fabric"});
@@ -71,7 +71,7 @@ TEST_CASE("scenes: measured materials in our own scenes") {
   CHECK(std::ranges::count(jewelry.materials, "Measured", &Material::name) == 1);
 }
 
-TEST_CASE("scenes: scenes from elsewhere") {
+TEST_CASE("scenes: third-party scenes are read") {
   const char* folder = dataFolder();
   if (!folder) return;
   const Known known = GENERATE(Known{"living-room", 65, 19, 0, true}, Known{"dining-room", 53, 15, 0, true},
@@ -88,7 +88,7 @@ TEST_CASE("scenes: scenes from elsewhere") {
   CHECK(scene.environment.has_value() == known.environment);
 }
 
-TEST_CASE("scenes: both scenes under a sunny sky") {
+TEST_CASE("scenes: the kitchen and the dining room have a sunny sky") {
   const char* folder = dataFolder();
   if (!folder) return;
   const std::string name = GENERATE("kitchen", "dining-room");
@@ -97,7 +97,7 @@ TEST_CASE("scenes: both scenes under a sunny sky") {
   CHECK(scene.environment.has_value());
 }
 
-TEST_CASE("scenes: the kitchen") {
+TEST_CASE("scenes: the kitchen is read") {
   const char* folder = dataFolder();
   if (!folder) return;
   const Scene scene = readScene(std::filesystem::path(folder) / "kitchen" / "scene.xml");

@@ -1,4 +1,4 @@
-// The sun's position, clear sky and sun, and the image they become.
+// The sun's position, clear sky and sun, and the environment map that is made from them.
 
 #include <cmath>
 #include <numbers>
@@ -22,8 +22,8 @@ Vector3d at(double zenith, double azimuth = 0) {
   return {std::sin(p) * std::sin(t), std::cos(t), -std::cos(p) * std::sin(t)};
 }
 
-/// ∫ radiance · (1, direction) dω of the image interpolated bilinearly, by a fine midpoint rule over the weights of
-/// each row, independent of the closed forms that the image was made with.
+/// ∫ radiance · (1, direction) dω of the bilinearly interpolated image, by a fine midpoint rule over the weights of
+/// each row, independent of the closed forms that were used to make the image.
 struct Integral {
   Vector3d power = Vector3d::Zero();
   Vector3d direction = Vector3d::Zero();  // weighted by the green channel
@@ -60,8 +60,8 @@ Environment bakeSun(const SunDisc& sun, int width = 256) {
 
 }  // namespace
 
-TEST_CASE("scenes: the sun stands where almanacs have it") {
-  DateAndPlace equinox{2010, 3, 20, 12, 7.5, 0, 0, 0, 0};  // noon is late by the equation of time
+TEST_CASE("scenes: the position of the sun agrees with almanacs") {
+  DateAndPlace equinox{2010, 3, 20, 12, 7.5, 0, 0, 0, 0};  // solar noon is late by the equation of time
   CHECK(sunDirection(equinox).y() > std::cos(0.2 * kDegree));
   DateAndPlace solstice{2010, 6, 21, 12, 1.8, 0, 0, 23.437, 0};
   CHECK(sunDirection(solstice).y() > std::cos(0.1 * kDegree));
@@ -76,10 +76,10 @@ TEST_CASE("scenes: the sun stands where almanacs have it") {
   CHECK((sunDirection(later) - tokyo).norm() < 0.27);  // the earth has turned by an hour
   CHECK((sunDirection(later) - tokyo).norm() > 1e-3);
   later.longitude -= 15;
-  CHECK((sunDirection(later) - tokyo).norm() < 1e-12);  // the same moment, told by another clock
+  CHECK((sunDirection(later) - tokyo).norm() < 1e-12);  // the same moment in another time zone
 }
 
-TEST_CASE("scenes: Preetham's sky has the zenith of its table") {
+TEST_CASE("scenes: Preetham's sky has the zenith luminance of its formula") {
   // Turbidity 3, sun 60° from the zenith: χ = (4/9 − 3/120) π/3, Y = 7.1649 tan χ + 1.7727 kcd/m².
   const PreethamSky sky(3, at(60));
   const double zenith = 1000 * (7.1649 * std::tan((4.0 / 9 - 0.025) * std::numbers::pi / 3) + 1.7727);
@@ -88,7 +88,7 @@ TEST_CASE("scenes: Preetham's sky has the zenith of its table") {
   CHECK(luminance(sky.radiance(Vector3d::UnitY())) * kLumens == Approx(zenith).epsilon(1e-4));
   const Rgb blue = sky.radiance(Vector3d::UnitY());
   CHECK((blue.z() > blue.y() && blue.y() > blue.x()));
-  // Brightest around the sun, black below the horizon, even at it.
+  // Brightest around the sun, black at and below the horizon.
   CHECK(luminance(sky.radiance(at(60, 5))) > 3 * luminance(sky.radiance(at(60, 180))));
   CHECK((sky.radiance(at(90.001)) == 0.0f).all());
   for (const double turbidity : {2.0, 4.0, 10.0})
@@ -101,14 +101,14 @@ TEST_CASE("scenes: Preetham's sky has the zenith of its table") {
       }
 }
 
-TEST_CASE("scenes: sunlight is as strong as it is measured") {
+TEST_CASE("scenes: sunlight has its measured illuminance") {
   const double half = std::sin(0.5 * sunRadius());
   const double solidAngle = 4 * std::numbers::pi * half * half;
   CHECK(solidAngle == Approx(6.87e-5).epsilon(1e-3));
   const auto lux = [&](double turbidity, double zenith) {
     return luminance(sunRadiance(turbidity, zenith * kDegree)) * solidAngle * kLumens;
   };
-  // 128 klx outside the atmosphere, about 100 at sea level from high up; a red sun sets.
+  // 128 klx outside the atmosphere, about 100 klx at sea level under a high sun; the setting sun is red.
   CHECK(lux(1, 0) < 128e3);
   CHECK(lux(2, 0) == Approx(103e3).epsilon(0.03));
   CHECK(lux(3, 30) == Approx(88e3).epsilon(0.05));
@@ -119,25 +119,25 @@ TEST_CASE("scenes: sunlight is as strong as it is measured") {
   CHECK(sunRadiance(10, 90 * kDegree).isFinite().all());
 }
 
-TEST_CASE("scenes: the image holds the sun's irradiance, whatever its size and place") {
+TEST_CASE("scenes: the environment map has the sun's irradiance for any radius and position") {
   const Rgb irradiance(1, 2, 3);
   for (const Vector3d& sun : {at(0), at(0.1, 30), at(0.7), at(44, 100), at(60, 0.01), at(89.9, 270), at(180)})
     for (const double radius : {0.01, 1.0, 4.0, 30.0}) {
       const Integral sum = integrate(bakeSun({sun, irradiance, radius * sunRadius()}).radiance);
       INFO(sun.transpose() << " at " << radius);
       CHECK((sum.power - Vector3d(1, 2, 3)).norm() < 1e-3);
-      // A disc shines a little less in its middle's direction.
+      // A disc has slightly less irradiance in the direction of its centre.
       const double mean = 0.5 * (1 + std::cos(radius * sunRadius()));
-      // Within a pixel of a pole, the row of pixels there hardly knows where.
+      // Within a pixel of a pole, the azimuth is poorly defined.
       const bool pole = std::hypot(sun.x(), sun.z()) < std::numbers::pi / 128;
       CHECK((sum.direction / 2 - mean * sun).norm() < (pole ? std::numbers::pi / 128 : 1e-3));
     }
-  // On the ground, exactly what the cosine makes of it.
+  // On the ground, exactly the irradiance times the cosine.
   const Integral sum = integrate(bakeSun({at(60, 123), irradiance, sunRadius()}, 1024).radiance);
   CHECK(sum.ground == Approx(2 * std::cos(60 * kDegree)).epsilon(1e-3));
 }
 
-TEST_CASE("scenes: the image holds the sky's light") {
+TEST_CASE("scenes: the environment map has the irradiance of the sky") {
   const PreethamSky sky(3, at(50, 70));
   const Environment baked =
       bakeDaylight({{{sky, Eigen::Matrix3d::Identity(), 2, 1}}, {}}, Eigen::Matrix3d::Identity(), 512);
@@ -145,14 +145,14 @@ TEST_CASE("scenes: the image holds the sky's light") {
   constexpr int kSteps = 500;
   for (int i = 0; i < kSteps; ++i)
     for (int j = 0; j < kSteps; ++j) {
-      const double rise = std::sqrt((i + 0.5) / kSteps);  // cosine, in equal parts of its square
+      const double rise = std::sqrt((i + 0.5) / kSteps);  // cosine, in equal steps of its square
       ground += sky.radiance(at(std::acos(rise) / kDegree, 360 * (j + 0.5) / kSteps)).y();
     }
   ground *= std::numbers::pi / kSteps / kSteps;
   CHECK(integrate(baked.radiance).ground == Approx(2 * ground).epsilon(2e-3));
 }
 
-TEST_CASE("scenes: skies and suns of a file add up to one environment") {
+TEST_CASE("scenes: skies and suns of a file are added to one environment") {
   const std::string place =
       "<vector name=\"sunDirection\" x=\"0.6\" y=\"0.8\"/><integer name=\"resolution\" value=\"64\"/>";
   const auto emitter = [&](const std::string& type, const std::string& more = "") {
@@ -171,11 +171,11 @@ TEST_CASE("scenes: skies and suns of a file add up to one environment") {
   CHECK(difference < 1e-3);
   CHECK(imageOf("<emitter type=\"sky\"/>").width == 1024);
 
-  // The sun's direction is the world's, whatever way the sky is turned.
+  // The sun's direction is in world space and independent of the rotation of the sky.
   const std::string turn = "<transform name=\"toWorld\"><rotate y=\"1\" angle=\"70\"/></transform>";
   const Environment turned = readBody(emitter("sun", turn)).environment.value();
   const Vector3d seen = turned.toWorld.cast<double>() * integrate(turned.radiance).direction.normalized();
-  CHECK((seen - Vector3d(0.6, 0.8, 0)).norm() < 3e-3);  // a pixel of 64 is 0.1
+  CHECK((seen - Vector3d(0.6, 0.8, 0)).norm() < 3e-3);  // one of 64 pixels is 0.1
 
   // Without a radius it is a directional light of the same irradiance.
   const Scene sharp = readBody(emitter("sunsky", "<float name=\"sunRadiusScale\" value=\"0\"/>"));
@@ -188,7 +188,7 @@ TEST_CASE("scenes: skies and suns of a file add up to one environment") {
   CHECK(clear.notes.size() == 1);
   REQUIRE(clear.warnings.size() == 1);
   CHECK(clear.warnings[0].find("albedo is ignored") != std::string::npos);
-  // A disc of 2 degrees across, as Mitsuba 3 and as 0.6 would have it: 3.733 times the sun's.
+  // A disc of 2 degrees in diameter, as given in Mitsuba 3 and in 0.6: 3.733 times that of the sun.
   const Image wide = imageOf(emitter("sun", "<float name=\"sun_aperture\" value=\"2\"/>"));
   const Image scaled = imageOf(emitter("sun", "<float name=\"sunRadiusScale\" value=\"3.73273610\"/>"));
   CHECK(integrate(wide).power.y() == Approx(integrate(imageOf(emitter("sun"))).power.y()).epsilon(1e-3));

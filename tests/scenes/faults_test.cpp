@@ -1,5 +1,5 @@
-// Faults in scene files: each is one line with the exact place, the offending text and what is known; and what lenient
-// reading makes of them.
+// Faults in scene files: each is reported in one line with the exact location, the offending text and the known names.
+// Lenient reading leaves out or replaces them.
 
 #include <catch2/catch.hpp>
 
@@ -21,7 +21,7 @@ void checkFault(const std::string& fault, const std::string& place, std::initial
 
 }  // namespace
 
-TEST_CASE("scenes: broken XML is told with its place") {
+TEST_CASE("scenes: malformed XML is reported with its location") {
   checkFault(faultOfText("<scene>\n  <shape type=\"obj\n</scene>\n"), "2:16", {"broken XML"});
   checkFault(faultOfText("<scene>\n  <shape></shapes>\n</scene>\n"), "2:12", {"broken XML", "mismatch"});
   checkFault(faultOfText(""), "1:1", {});
@@ -29,14 +29,14 @@ TEST_CASE("scenes: broken XML is told with its place") {
   checkFault(faultOf("<shape type=\"disk\">\n some text</shape>"), "3:2", {"\"some\""});
 }
 
-TEST_CASE("scenes: a file that is not there is named") {
+TEST_CASE("scenes: a missing file is named") {
   const TestFolder folder;
   REQUIRE_THROWS_AS(readScene(folder.path() / "none.xml"), SceneError);
   CHECK_THROWS_WITH(readScene(folder.path() / "none.xml"), Catch::Contains("none.xml"));
   CHECK_THROWS_AS(readScene(folder.path()), SceneError);
 }
 
-TEST_CASE("scenes: unknown elements and types are told with what is known") {
+TEST_CASE("scenes: unknown elements and types are reported with the known ones") {
   checkFault(faultOf("\t<bdsf type=\"diffuse\"/>"), "2:2", {"<bdsf>", "bsdf", "shape"});
   checkFault(faultOf("<shape type=\"disk\">\n  <flaot name=\"radius\" value=\"1\"/>\n</shape>"), "3:3",
              {"<flaot>", "shape \"disk\"", "float"});
@@ -58,7 +58,7 @@ TEST_CASE("scenes: unknown elements and types are told with what is known") {
   checkFault(faultOfText("<scene/>"), "1:1", {"sensor"});
 }
 
-TEST_CASE("scenes: unknown parameters are told with their owner") {
+TEST_CASE("scenes: unknown parameters are reported with their element") {
   checkFault(faultOf("<bsdf type=\"roughplastic\">\n\t<float name=\"foo\" value=\"1\"/>\n</bsdf>"), "3:2",
              {"\"foo\"", "bsdf \"roughplastic\""});
   checkFault(faultOf("<shape type=\"disk\">\n<float name=\"radius\" value=\"1\"/></shape>"), "3:1",
@@ -75,7 +75,7 @@ TEST_CASE("scenes: unknown parameters are told with their owner") {
              {"vale", "name, value"});
 }
 
-TEST_CASE("scenes: wrong values are told with their text") {
+TEST_CASE("scenes: invalid values are reported with their text") {
   const auto fault = [](const std::string& element) {
     return faultOf("<bsdf type=\"roughplastic\">\n  " + element + "</bsdf>");
   };
@@ -106,7 +106,7 @@ TEST_CASE("scenes: wrong values are told with their text") {
              "1:35", {"long", "50mm"});
 }
 
-TEST_CASE("scenes: emitters without meaning are refused") {
+TEST_CASE("scenes: invalid emitters are rejected") {
   const auto fault = [](const std::string& type, const std::string& body) {
     return faultOf("<emitter type=\"" + type + "\">\n  " + body + "</emitter>");
   };
@@ -129,7 +129,7 @@ TEST_CASE("scenes: emitters without meaning are refused") {
   checkFault(fault("point", "<float name=\"power\" value=\"1\"/>"), "3:3", {"\"power\"", "intensity"});
 }
 
-TEST_CASE("scenes: skies without meaning are refused") {
+TEST_CASE("scenes: invalid skies are rejected") {
   const auto fault = [](const std::string& type, const std::string& body) {
     return faultOf("<emitter type=\"" + type + "\">\n  " + body + "</emitter>");
   };
@@ -157,7 +157,7 @@ TEST_CASE("scenes: skies without meaning are refused") {
         "");
 }
 
-TEST_CASE("scenes: cameras and crops without meaning are refused") {
+TEST_CASE("scenes: invalid cameras and crops are rejected") {
   const auto fault = [](const std::string& type, const std::string& body) {
     return faultOfText("<scene version=\"3.0.0\"><sensor type=\"" + type + "\">\n" + body + "</sensor></scene>");
   };
@@ -175,7 +175,7 @@ TEST_CASE("scenes: cameras and crops without meaning are refused") {
              "3:1", {"crop_width", "1 to 90", "91"});
 }
 
-TEST_CASE("scenes: missing and damaged files are told with both names") {
+TEST_CASE("scenes: missing and damaged files are reported with the scene and the file") {
   const TestFolder folder;
   const auto fault = [&](const std::string& body) {
     try {
@@ -203,7 +203,7 @@ TEST_CASE("scenes: missing and damaged files are told with both names") {
              {"sky.exr"});
 }
 
-TEST_CASE("scenes: undefined names and references are told") {
+TEST_CASE("scenes: undefined names and references are reported") {
   checkFault(faultOf("<default name=\"b\" value=\"1\"/>\n<bsdf type=\"diffuse\">"
                      "<float name=\"reflectance\" value=\"$a\"/></bsdf>"),
              "3:22", {"$a", "defined are b"});
@@ -211,7 +211,7 @@ TEST_CASE("scenes: undefined names and references are told") {
   checkFault(faultOf("<bsdf type=\"diffuse\" id=\"A\"/>\n<bsdf type=\"diffuse\" id=\"A\"/>"), "3:1", {"\"A\"", ":2:1"});
 }
 
-TEST_CASE("scenes: groups and instances that make no sense are refused") {
+TEST_CASE("scenes: invalid groups and instances are rejected") {
   const auto group = [](const std::string& inside) {
     return "<shape type=\"shapegroup\" id=\"g\">" + inside + "</shape>";
   };
@@ -224,12 +224,12 @@ TEST_CASE("scenes: groups and instances that make no sense are refused") {
              Catch::Contains("singular"));
 }
 
-TEST_CASE("scenes: a cylinder without length is refused") {
+TEST_CASE("scenes: a cylinder of zero length is rejected") {
   CHECK_THAT(faultOf("<shape type=\"cylinder\">\n<point name=\"p1\" x=\"0\" y=\"0\" z=\"0\"/></shape>"),
              Catch::Contains("3:1") && Catch::Contains("must differ"));
 }
 
-TEST_CASE("scenes: lenient reading replaces what it does not know and warns once per kind") {
+TEST_CASE("scenes: lenient reading replaces unknown elements and warns once per kind") {
   const Scene scene = readBody(
       "<shape type=\"torus\"/><shape type=\"torus\"/>"
       "<shape type=\"sphere\" id=\"Kept\"><bsdf type=\"velvet\"><float name=\"fuzz\" value=\"1\"/></bsdf></shape>"

@@ -1,4 +1,4 @@
-// The hash that ties trained illumination to its scene.
+// The hash that identifies the scene of trained illumination.
 
 #include <catch2/catch.hpp>
 
@@ -50,7 +50,7 @@ struct Files {
 
 }  // namespace
 
-TEST_CASE("scenes: the hash stays when neither shapes, materials nor emitters change") {
+TEST_CASE("scenes: the hash stays the same when neither shapes nor materials nor emitters change") {
   const std::uint64_t hash = Files().hash();
   CHECK(Files().hash() == hash);  // in another folder
   Files camera;
@@ -64,18 +64,18 @@ TEST_CASE("scenes: the hash stays when neither shapes, materials nor emitters ch
   CHECK(integrator.hash() == hash);
 }
 
-TEST_CASE("scenes: the hash changes with everything that light depends on") {
+TEST_CASE("scenes: the hash changes with everything that determines the light transport") {
   const std::uint64_t hash = Files().hash();
   const std::vector<std::pair<std::string, std::string>> changes{
       {"0.25", "0.26"},                               // a nested material's parameter
-      {"value=\"ggx\"", "value=\"beckmann\""},        // a word
+      {"value=\"ggx\"", "value=\"beckmann\""},        // an enumeration value
       {"value=\"0.1\"", "value=\"0.2\""},             // a texture's colour
-      {"<ref id=\"wood\"/>", "<ref id=\"cloth\"/>"},  // who has which material
+      {"<ref id=\"wood\"/>", "<ref id=\"cloth\"/>"},  // assignment of materials
       {"x=\"3\"", "x=\"3.0001\""},                    // a sphere
       {"type=\"disk\">", "type=\"disk\"><boolean name=\"flip_normals\" value=\"true\"/>"},
       {"value=\"0.5\"/><ref", "value=\"0.6\"/><ref"},        // a cylinder
       {"<translate x=\"7\"/>", "<translate y=\"7\"/>"},      // an instance
-      {"<shape type=\"cube\">", "<shape type=\"sphere\">"},  // what it shows
+      {"<shape type=\"cube\">", "<shape type=\"sphere\">"},  // the instanced shape
       {"value=\"5\"", "value=\"6\""},                        // lights
       {"y=\"9\"", "y=\"8\""},
       {"value=\"20\"", "value=\"21\""},

@@ -1,4 +1,4 @@
-// Materials in scene files of both dialects: nested models in their order, textures by name, encodings.
+// Materials in scene files of both dialects: order of nested models, textures by name, encodings.
 
 #include <catch2/catch.hpp>
 
@@ -37,7 +37,7 @@ std::string greyBmp(char value) {
 
 }  // namespace
 
-TEST_CASE("scenes: null and difftrans") {
+TEST_CASE("scenes: null and difftrans are read") {
   CHECK(bsdfOf("<bsdf type=\"null\"/>")->deltaProbability(kUp, Vec2::Zero()) == 1.0f);
   CHECK(albedoAt(bsdfOf("<bsdf type=\"difftrans\"><spectrum name=\"transmittance\" value=\"0.3\"/></bsdf>")) ==
         Approx(0.3f));
@@ -45,7 +45,7 @@ TEST_CASE("scenes: null and difftrans") {
         std::string::npos);
 }
 
-TEST_CASE("scenes: blends keep the order of what is nested, whether written there or referred to") {
+TEST_CASE("scenes: blends keep the order of nested and referenced bsdfs") {
   const std::string nested = diffuse("0.2") + diffuse("0.6");
   for (const std::string& order : {number("weight", "0.25") + nested, nested + number("weight", "0.25")})
     CHECK(albedoAt(bsdfOf("<bsdf type=\"blendbsdf\">" + order + "</bsdf>")) == Approx(0.3f));
@@ -55,14 +55,14 @@ TEST_CASE("scenes: blends keep the order of what is nested, whether written ther
       "<ref id=\"A\"/><ref name=\"bsdf_1\" id=\"B\"/></bsdf></shape>"
       "<bsdf type=\"diffuse\" id=\"B\"><float name=\"reflectance\" value=\"0.8\"/></bsdf>"
       "<bsdf type=\"diffuse\" id=\"A\"><float name=\"reflectance\" value=\"0.1\"/></bsdf>");
-  // A checkerboard of numbers has color0 where its coordinates are in different halves.
+  // A checkerboard of numbers has color0 where one coordinate is in the lower half and the other in the upper half.
   CHECK(albedoAt(scene.materials.at(0).bsdf, Vec2(0.25f, 0.25f)) == Approx(0.1f));
   CHECK(albedoAt(scene.materials.at(0).bsdf, Vec2(0.75f, 0.25f)) == Approx(0.8f));
   CHECK(faultOf("<bsdf type=\"blendbsdf\">" + diffuse("0.2") + "</bsdf>").find("two nested bsdfs") !=
         std::string::npos);
 }
 
-TEST_CASE("scenes: mixtures") {
+TEST_CASE("scenes: mixtures weight their nested bsdfs") {
   const BsdfPtr mixture = bsdfOf("<bsdf type=\"mixturebsdf\"><string name=\"weights\" value=\"0.5, 0.25\"/>" +
                                  diffuse("0.2") + diffuse("0.8") + "</bsdf>");
   CHECK(albedoAt(mixture) == Approx(0.3f));
@@ -73,9 +73,9 @@ TEST_CASE("scenes: mixtures") {
   CHECK(fault.find("\"b\"") != std::string::npos);
 }
 
-TEST_CASE("scenes: normal maps hold plain numbers whatever the file says; other textures stay colours") {
+TEST_CASE("scenes: normal maps are linear for any stated encoding and other textures stay colours") {
   const TestFolder folder;
-  folder.write("grey.bmp", greyBmp('\xcc'));  // 0.8, which is 0.6 as a colour
+  folder.write("grey.bmp", greyBmp('\xcc'));  // 0.8 as a linear value, 0.6 as an sRGB colour
   const std::string file = "<string name=\"filename\" value=\"grey.bmp\"/>";
   const auto leaning = [&](const std::string& texture, const std::string& rest = "") {
     const Scene scene =
@@ -103,13 +103,13 @@ TEST_CASE("scenes: normal maps hold plain numbers whatever the file says; other 
   CHECK(albedoAt(both.materials.at(1).bsdf) == Approx(0.604f).epsilon(1e-2));
 }
 
-TEST_CASE("scenes: a mask inside twosided is told to go outside") {
+TEST_CASE("scenes: a mask inside twosided is rejected") {
   const std::string masked = "<bsdf type=\"mask\">" + diffuse("0.5") + "</bsdf>";
   CHECK(faultOf("<bsdf type=\"twosided\">" + masked + "</bsdf>").find("mask > twosided") != std::string::npos);
   CHECK(faultOf("<bsdf type=\"mask\"><bsdf type=\"twosided\">" + diffuse("0.5") + "</bsdf></bsdf>") == "");
 }
 
-TEST_CASE("scenes: phong, ward and roughdiffuse as Mitsuba 0.6 spells them") {
+TEST_CASE("scenes: phong and ward and roughdiffuse in the spelling of Mitsuba 0.6") {
   const std::string checkerboard = "<texture type=\"checkerboard\" name=";
   const BsdfPtr phong = bsdfOf("<bsdf type=\"phong\"><float name=\"exponent\" value=\"50\"/>" + checkerboard +
                                "\"diffuseReflectance\"/><spectrum name=\"specularReflectance\" value=\"0.3\"/></bsdf>");
@@ -123,7 +123,7 @@ TEST_CASE("scenes: phong, ward and roughdiffuse as Mitsuba 0.6 spells them") {
   const BsdfPtr rough =
       bsdfOf("<bsdf type=\"roughdiffuse\">" + checkerboard + "\"alpha\"/>" + number("reflectance", "0.6") +
              "<boolean name=\"useFastApprox\" value=\"true\"/></bsdf>");
-  // The rougher, the darker; in files of today, the rougher squares of numbers are where coordinates differ.
+  // A rougher surface is darker; in files for Mitsuba 3, the rougher squares are those where the coordinates differ.
   CHECK(albedoAt(rough, Vec2(0.25f, 0.25f)) > albedoAt(rough, Vec2(0.75f, 0.25f)));
   const std::string fault = faultOf("<bsdf type=\"phong\">\n" + number("alpha", "0.1") + "</bsdf>");
   INFO(fault);
@@ -132,7 +132,7 @@ TEST_CASE("scenes: phong, ward and roughdiffuse as Mitsuba 0.6 spells them") {
         std::string::npos);
 }
 
-TEST_CASE("scenes: measured materials are read from beside the scene, and only where something is made of them") {
+TEST_CASE("scenes: measured materials are read relative to the scene and only if they are used") {
   const TestFolder folder;
   const auto fields = measuredFields([](const auto&, const auto&) { return grey(0.1f); }, {0.0f}, 4);
   std::filesystem::create_directory(folder.path() / "data");
@@ -149,14 +149,14 @@ TEST_CASE("scenes: measured materials are read from beside the scene, and only w
   CHECK(scene.materials[0].bsdf->lobes()[0]->summary() == "paint_rgb");
 }
 
-TEST_CASE("scenes: faults of measured materials are told at their place") {
+TEST_CASE("scenes: faults of measured materials are reported with their location") {
   const auto inSphere = [](const std::string& type, const std::string& parameters) {
     return "<shape type=\"sphere\">\n<bsdf type=\"" + type + "\">\n " + parameters + "</bsdf></shape>";
   };
   const std::string missing = inSphere("measured", "<string name=\"filename\" value=\"none_rgb.bsdf\"/>");
-  CHECK_THAT(faultOf(missing), Catch::StartsWith("test.xml:4:2: ") && Catch::Contains("none_rgb.bsdf is not there"));
+  CHECK_THAT(faultOf(missing), Catch::StartsWith("test.xml:4:2: ") && Catch::Contains("none_rgb.bsdf does not exist"));
   CHECK(readBody(missing, lenient()).warnings.size() == 1);
-  // The scene itself is no measurement.
+  // The scene file itself is not a measurement.
   for (const std::string type : {"measured", "merl"})
     CHECK_THAT(faultOf(inSphere(type, "<string name=\"filename\" value=\"test.xml\"/>")),
                Catch::StartsWith("test.xml:4:2: ") && Catch::Contains("not a"));
@@ -164,7 +164,7 @@ TEST_CASE("scenes: faults of measured materials are told at their place") {
   CHECK_THAT(faultOf(inSphere("measured", "<float name=\"filename\" value=\"1\"/>")), Catch::Contains("text"));
 }
 
-TEST_CASE("scenes: principled as Mitsuba 3 spells it") {
+TEST_CASE("scenes: principled in the spelling of Mitsuba 3") {
   const BsdfPtr bsdf =
       bsdfOf("<bsdf type=\"principled\"><rgb name=\"base_color\" value=\"1.0,1.0,1.0\"/>" + number("metallic", "0.7") +
              number("specular", "0.6") + number("roughness", "0.2") + number("spec_tint", "0.4") +
@@ -177,7 +177,7 @@ TEST_CASE("scenes: principled as Mitsuba 3 spells it") {
   const BsdfPtr textured = bsdfOf(
       "<bsdf type=\"twosided\"><bsdf type=\"principled\"><texture name=\"base_color\" type=\"checkerboard\"/>"
       "<texture name=\"metallic\" type=\"checkerboard\"/></bsdf></bsdf>");
-  // 0.4 · (1 − 0.2) against 0.2 · (1 − 0.4): the squares of numbers are the other way round.
+  // 0.4 · (1 − 0.2) against 0.2 · (1 − 0.4): the squares of numbers are exchanged.
   CHECK(textured->mixture(kUp, Vec2(0.25f, 0.25f)).constant ==
         Approx(8.0f / 3 * textured->mixture(kUp, Vec2(0.75f, 0.25f)).constant));
   const std::string fault =
@@ -189,7 +189,7 @@ TEST_CASE("scenes: principled as Mitsuba 3 spells it") {
         std::string::npos);
 }
 
-TEST_CASE("scenes: mapped normals flip and shadow by default from version 3 on") {
+TEST_CASE("scenes: mapped normals are flipped and shadowed by default from version 3 on") {
   const auto shadows = [](const std::string& version, const std::string& option) {
     const Scene scene =
         readText("<scene version=\"" + version + "\"><shape type=\"sphere\"><bsdf type=\"bumpmap\">" + option +
@@ -214,7 +214,8 @@ TEST_CASE("scenes: mapped normals flip and shadow by default from version 3 on")
   CHECK(leaning.notes.empty());
 }
 
-TEST_CASE("scenes: reflectances above 1 are scaled below version 2, and kept above, with a warning at their line") {
+TEST_CASE(
+    "scenes: reflectances above 1 are scaled below version 2 and kept from version 2 on with a warning at their line") {
   const auto read = [](const std::string& version, const std::string& option = "") {
     return readText("<scene version=\"" + version + "\">\n<shape type=\"sphere\"><bsdf type=\"plastic\">" + option +
                     "\n <rgb name=\"diffuseReflectance\" value=\"255 255 25.5\"/></bsdf></shape>" + kSensor +
@@ -248,7 +249,7 @@ TEST_CASE("scenes: textures above 1 are scaled as a whole") {
   CHECK(albedoAt(scene.materials.at(0).bsdf, Vec2(0.75f, 0.25f)) == Approx(0.495f));
 }
 
-TEST_CASE("scenes: mixture weights above 1 in sum") {
+TEST_CASE("scenes: mixture weights whose sum exceeds 1") {
   const auto read = [](const std::string& option) {
     return readText("<scene version=\"0.6.0\"><shape type=\"sphere\"><bsdf type=\"mixturebsdf\">" + option +
                     "\n<string name=\"weights\" value=\"1, 1\"/>" + diffuse("0.08") + diffuse("0.9") +
@@ -263,13 +264,13 @@ TEST_CASE("scenes: mixture weights above 1 in sum") {
   CHECK(albedoAt(scaled.materials.at(0).bsdf) == Approx(0.49f));
 }
 
-TEST_CASE("scenes: coatings and thin surfaces as Mitsuba spells them") {
+TEST_CASE("scenes: coatings and thin surfaces in the spelling of Mitsuba") {
   const std::string coat =
       "<float name=\"intIOR\" value=\"1.5\"/><float name=\"extIOR\" value=\"1\"/><float name=\"thickness\" "
       "value=\"2\"/><spectrum name=\"sigmaA\" value=\"0.1 0.2 0.5\"/>"
       "<spectrum name=\"specularReflectance\" value=\"0.5\"/>";
   const BsdfPtr smooth = bsdfOf("<bsdf type=\"coating\">" + coat + diffuse("1") + "</bsdf>");
-  // Straight through 2 of thickness and back.
+  // Perpendicularly through a thickness of 2 and back.
   const Rgb expected = (-4.0f * Rgb(0.1f, 0.2f, 0.5f)).exp() * (0.96f * 0.96f / (2.25f * kPi));
   CHECK(smooth->eval(kUp, kUp, Vec2::Zero()).isApprox(expected, 1e-4f));
   CHECK(smooth->sampleDelta(kUp, Vec2::Zero(), 0.5f)->weight.x() == Approx(0.02f));

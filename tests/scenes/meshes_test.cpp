@@ -16,7 +16,7 @@ namespace {
 
 const Vec3 kUp = Vec3::UnitZ();
 
-/// Groups, each a square of side 1 of its own material, and one of a material that the library does not have.
+/// Groups: unit squares, each with a material of its own, one of which is not in the library.
 const std::string kSquares =
     "mtllib colours.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0.25 0.25\n"
     "g left\nusemtl red\nf 1/1 2/1 3/1 4/1\ng right\nusemtl green\nf 1/1 2/1 3/1 4/1\nusemtl unknown\nf 1/1 2/1 3/1\n";
@@ -48,7 +48,7 @@ Rgb albedoOf(const Scene& scene, std::size_t shape) {
   return bsdfOf(scene, shape).albedo(kUp, Vec2(0.25f, 0.25f));
 }
 
-/// The BSDF of a material, applied to the first of the squares.
+/// The BSDF of an MTL material that is assigned to the first of the squares.
 BsdfPtr bsdfOfMtl(const std::string& statements) {
   const Scene scene = ObjScene("newmtl red\n" + statements).read();
   return scene.materials.at(static_cast<std::size_t>(scene.shapes.at(0).material)).bsdf;
@@ -58,7 +58,7 @@ bool isNear(const Rgb& a, const Rgb& b, float tolerance = 1e-5f) {
   return (a - b).abs().maxCoeff() <= tolerance;
 }
 
-/// A BMP of a single pixel.
+/// A BMP with a single pixel.
 std::string onePixel(unsigned char red, unsigned char green, unsigned char blue) {
   std::string bytes("BM\x3a\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\1\0\0\0\1\0\0\0\1\0\x18\0\0\0\0\0\4\0\0\0", 38);
   bytes += std::string(16, '\0');
@@ -68,19 +68,19 @@ std::string onePixel(unsigned char red, unsigned char green, unsigned char blue)
 
 }  // namespace
 
-TEST_CASE("scenes: an OBJ of an older file has the materials of its library") {
+TEST_CASE("scenes: an OBJ in an older file has the materials of its library") {
   const Scene scene = ObjScene(kRedAndGreen).read();
   REQUIRE(scene.shapes.size() == 3);
   CHECK(scene.shapes[0].name == "a.obj:red");
   CHECK(isNear(albedoOf(scene, 0), Rgb(1, 0, 0)));
-  // Colours are encoded as sRGB, as Mitsuba 0.6 takes them.
+  // Colours are sRGB-encoded, as in Mitsuba 0.6.
   CHECK(isNear(albedoOf(scene, 1), Rgb(0, static_cast<float>(std::pow((0.5 + 0.055) / 1.055, 2.4)), 0)));
   CHECK(isNear(albedoOf(scene, 2), grey(0.5f)));
   CHECK(scene.warnings.empty());
   CHECK(scene.notes.empty());
 }
 
-TEST_CASE("scenes: an OBJ's library is left alone where something else gives the materials") {
+TEST_CASE("scenes: the library of an OBJ is ignored where the scene gives materials") {
   const ObjScene files(kRedAndGreen);
   const std::string grey3 = "type=\"diffuse\"><rgb name=\"reflectance\" value=\"0.3\"/></bsdf>";
   const Scene whole = files.read("<bsdf " + grey3);
@@ -96,7 +96,7 @@ TEST_CASE("scenes: an OBJ's library is left alone where something else gives the
   CHECK(files.read("<boolean name=\"load_materials\" value=\"true\"/>", "3.0.0").shapes.size() == 3);
 }
 
-TEST_CASE("scenes: a shape index chooses among an OBJ's meshes") {
+TEST_CASE("scenes: shape_index selects a mesh of an OBJ") {
   const ObjScene files(kRedAndGreen);
   const auto indexed = [](int index) { return fmt::format("<integer name=\"shapeIndex\" value=\"{}\"/>", index); };
   for (const auto& [index, colour] : {std::pair(0, Rgb(1, 0, 0)), std::pair(2, grey(0.5f))}) {
@@ -110,7 +110,7 @@ TEST_CASE("scenes: a shape index chooses among an OBJ's meshes") {
   CHECK_THROWS_WITH(files.read(indexed(3)), Contains("there is no mesh 3"));
 }
 
-TEST_CASE("scenes: a collapsed OBJ has the material that it names last") {
+TEST_CASE("scenes: a collapsed OBJ has the material of its last usemtl") {
   const ObjScene files(kRedAndGreen + "newmtl unknown\nKd 0 0 1\n");
   const Scene scene = files.read("<boolean name=\"collapse\" value=\"true\"/>");
   REQUIRE(scene.shapes.size() == 1);
@@ -118,7 +118,7 @@ TEST_CASE("scenes: a collapsed OBJ has the material that it names last") {
   CHECK(std::get<TriangleMesh>(scene.shapes[0].geometry).triangles.size() == 5);
 }
 
-TEST_CASE("scenes: the illumination models of an MTL become BSDFs as in Mitsuba 0.6") {
+TEST_CASE("scenes: illumination models of an MTL are converted to BSDFs as in Mitsuba 0.6") {
   const Vec3 wi = Vec3(0.3f, 0.2f, 0.8f).normalized();
   const Vec3 mirrored(-wi.x(), -wi.y(), wi.z());
   const std::string phong = "Kd 0.5 0.5 0.5\nKs 0.25 0.25 0.25\nNs 20\n";
@@ -133,7 +133,7 @@ TEST_CASE("scenes: the illumination models of an MTL become BSDFs as in Mitsuba 
     CHECK(bsdfOfMtl(text)->eval(wi, mirrored, {0, 0}).y() == Approx(diffuse).epsilon(1e-5));
   for (const int glass : {4, 6, 7, 9}) {
     const BsdfPtr bsdf = bsdfOfMtl(phong + fmt::format("illum {}\n", glass));
-    CHECK(bsdf->sampleDelta(kUp, {0, 0}, 0.999f)->wi.z() == Approx(-1));  // light passes
+    CHECK(bsdf->sampleDelta(kUp, {0, 0}, 0.999f)->wi.z() == Approx(-1));  // light is transmitted
   }
   for (const int metal : {5, 8}) {
     const BsdfPtr bsdf = bsdfOfMtl(phong + fmt::format("illum {}\n", metal));
@@ -144,7 +144,7 @@ TEST_CASE("scenes: the illumination models of an MTL become BSDFs as in Mitsuba 
   }
 }
 
-TEST_CASE("scenes: opacity, images and bumps of an MTL") {
+TEST_CASE("scenes: opacity and images and bump maps of an MTL") {
   const ObjScene files(
       "newmtl red\nKd 1 1 1\nd 0.25\nnewmtl green\nmap_Kd maps\\half grey.bmp\nnewmtl unknown\nmap_d gone.bmp\n"
       "map_Kd -s 2 2 2 grey.bmp\n");
@@ -155,14 +155,14 @@ TEST_CASE("scenes: opacity, images and bumps of an MTL") {
   REQUIRE(scene.shapes.size() == 3);
   CHECK(isNear(bsdfOf(scene, 0).eval(kUp, kUp, {0, 0}), grey(0.25f / std::numbers::pi_v<float>)));
   CHECK(isNear(albedoOf(scene, 1), Rgb(0.5029f, 0, 1), 1e-3f));
-  // An image that is not there is black, here opacity: nothing is left of the surface.
+  // A missing image is replaced by black, which here makes the surface fully transparent.
   CHECK(isNear(bsdfOf(scene, 2).eval(kUp, kUp, {0, 0}), Rgb::Zero()));
   REQUIRE(scene.warnings.size() == 2);
   CHECK_THAT(scene.warnings[0], Contains("options of the image") && Contains("line 8"));
-  CHECK_THAT(scene.warnings[1], Contains("test.xml:2:") && Contains("gone.bmp is not there: black is used"));
+  CHECK_THAT(scene.warnings[1], Contains("test.xml:2:") && Contains("gone.bmp does not exist: black is used"));
 }
 
-TEST_CASE("scenes: a bump of an MTL tilts the normal") {
+TEST_CASE("scenes: a bump map of an MTL tilts the normal") {
   const ObjScene files("newmtl red\nKd 1 1 1\nbump slope.bmp\n");
   // Two pixels, black and white: between their centres the height rises by 1 in half of the image.
   std::string slope = onePixel(0, 0, 0);
@@ -177,7 +177,7 @@ TEST_CASE("scenes: a bump of an MTL tilts the normal") {
 }
 
 // As sRGB, 0.9 is 0.787 and 0.6 is 0.319.
-TEST_CASE("scenes: colours of an MTL that exceed 1 in sum are scaled, with a warning") {
+TEST_CASE("scenes: colours of an MTL whose sum exceeds 1 are scaled with a warning") {
   const ObjScene files("newmtl red\nKd 0.9 0 0\nKs 0.6 0 0\nNs 10\nillum 2\n");
   const Scene scene = files.read();
   REQUIRE(scene.warnings.size() == 1);
@@ -186,7 +186,7 @@ TEST_CASE("scenes: colours of an MTL that exceed 1 in sum are scaled, with a war
   CHECK(bsdfOf(scene, 0).albedo(Vec3::UnitZ(), {0.5f, 0.5f}).x() == Approx(0.99f));
 }
 
-TEST_CASE("scenes: a library that is not there or damaged is warned of") {
+TEST_CASE("scenes: a missing or malformed library causes a warning") {
   const Scene absent = ObjScene("").read();
   REQUIRE(absent.warnings.size() == 1);
   CHECK_THAT(absent.warnings[0], Contains("test.xml:2:19: ") && Contains("colours.mtl: no such file"));
@@ -194,10 +194,10 @@ TEST_CASE("scenes: a library that is not there or damaged is warned of") {
   CHECK(isNear(albedoOf(absent, 0), grey(0.5f)));
   const Scene damaged = ObjScene("newmtl red\nKd one 0 0\n").read();
   REQUIRE(damaged.warnings.size() == 1);
-  CHECK_THAT(damaged.warnings[0], Contains("colours.mtl: line 2: \"one\" is no number"));
+  CHECK_THAT(damaged.warnings[0], Contains("colours.mtl: line 2: \"one\" is not a number"));
 }
 
-TEST_CASE("scenes: maxSmoothAngle is read, but not with flat faces") {
+TEST_CASE("scenes: maxSmoothAngle is read and excludes flat faces") {
   const std::string folded = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 0 1 1\nf 1 2 3 4\nf 5 1 4 6\n";
   const ObjScene files("", folded);
   const auto angle = [](int degrees) { return fmt::format("<float name=\"maxSmoothAngle\" value=\"{}\"/>", degrees); };
@@ -212,7 +212,7 @@ TEST_CASE("scenes: maxSmoothAngle is read, but not with flat faces") {
   CHECK_THROWS_WITH(files.read(angle(181)), Contains("between 0 and 180"));
 }
 
-TEST_CASE("scenes: things too far away are refused at their place") {
+TEST_CASE("scenes: objects that are too far away are rejected with their location") {
   const auto moved = [](const std::string& type, const std::string& to) {
     return "<" + type + "><transform name=\"to_world\"><translate x=\"" + to + "\"/></transform></";
   };

@@ -1,4 +1,4 @@
-// What scene files say, as the reader understands it: spellings, references, transforms, cameras, lights, textures.
+// How the reader interprets scene files: spellings, references, transforms, cameras, lights, textures.
 
 #include <cmath>
 #include <numbers>
@@ -21,7 +21,7 @@ const TriangleMesh& meshOf(const Scene& scene, std::size_t shape = 0) {
   return std::get<TriangleMesh>(scene.shapes.at(shape).geometry);
 }
 
-/// Where the transform takes (1, 2, 3), by way of a sensor.
+/// The image of (1, 2, 3) under the transform, read as that of a sensor.
 Vec3 moved(const std::string& steps) {
   const Scene scene = readText("<scene><sensor type=\"perspective\"><transform name=\"to_world\">" + steps +
                                "</transform></sensor></scene>");
@@ -44,7 +44,7 @@ double tangent(double degrees) {
   return std::tan(0.5 * degrees * std::numbers::pi / 180);
 }
 
-/// A 2×1 image of black and white as an uncompressed 24-bit BMP, rows padded to four bytes.
+/// A 2×1 black-and-white image as an uncompressed 24-bit BMP, rows padded to four bytes.
 std::string blackAndWhiteBmp() {
   std::string bytes("BM\x3e\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\x02\0\0\0\x01\0\0\0\x01\0\x18\0\0\0\0\0\x08\0\0\0", 38);
   bytes += std::string(16, '\0');
@@ -53,7 +53,7 @@ std::string blackAndWhiteBmp() {
 
 }  // namespace
 
-TEST_CASE("scenes: names in camelCase and in snake_case are the same") {
+TEST_CASE("scenes: names in camelCase and in snake_case are equivalent") {
   for (const std::string spelling : {"<rgb name=\"diffuseReflectance\" value=\"0.1 0.2 0.3\"/>",
                                      "<rgb name=\"diffuse_reflectance\" value=\"0.1, 0.2, 0.3\"/>",
                                      "<spectrum name=\"diffuseReflectance\" value=\"0.1,0.2,0.3\"/>"}) {
@@ -74,7 +74,7 @@ TEST_CASE("scenes: names in camelCase and in snake_case are the same") {
                 "<float name=\"extEta\" value=\"1\"/></bsdf></shape>") == "");
 }
 
-TEST_CASE("scenes: colours come as one number, three numbers and sRGB codes") {
+TEST_CASE("scenes: colours are read from one number or three numbers or sRGB codes") {
   const auto colour = [](const std::string& element) {
     return albedoOf(readBody("<shape type=\"sphere\"><bsdf type=\"diffuse\">" + element + "</bsdf></shape>"), 0);
   };
@@ -87,7 +87,7 @@ TEST_CASE("scenes: colours come as one number, three numbers and sRGB codes") {
   CHECK(decoded.z() == 0.0f);
 }
 
-TEST_CASE("scenes: Mitsuba 0.4's camera and luminaire are sensor and emitter") {
+TEST_CASE("scenes: camera and luminaire of Mitsuba 0.4 are read as sensor and emitter") {
   const Scene scene = readText(
       "<scene version=\"0.4.0\"><camera type=\"perspective\"><float name=\"fov\" value=\"33\"/></camera>"
       "<shape type=\"sphere\"><luminaire type=\"area\"><rgb name=\"radiance\" "
@@ -97,7 +97,7 @@ TEST_CASE("scenes: Mitsuba 0.4's camera and luminaire are sensor and emitter") {
   CHECK((scene.shapes[0].emitter->radiance->mean() == 3.0f).all());
 }
 
-TEST_CASE("scenes: $names come from the command line before the file's defaults") {
+TEST_CASE("scenes: definitions on the command line override the defaults of the file") {
   const std::string text =
       "<scene><default name=\"w\" value=\"64\"/><default name=\"h\" value=\"32\"/><sensor type=\"perspective\">"
       "<film type=\"hdrfilm\"><integer name=\"width\" value=\"$w\"/><integer name=\"height\" value=\"1$h\"/></film>"
@@ -108,7 +108,7 @@ TEST_CASE("scenes: $names come from the command line before the file's defaults"
   ReadOptions options;
   options.definitions = {{"w", "17"}};
   CHECK(readText(text, options).camera.width == 17);
-  // A default without a use may be defined all the same, a name that the scene does not have may not.
+  // An unused default may be defined, but not a name that the scene does not contain.
   CHECK_NOTHROW(readText("<scene><default name=\"spp\" value=\"4\"/>" + std::string(kSensor) + "</scene>",
                          ReadOptions{{{"spp", "8"}}, false, true}));
   const std::string fault = faultOfText(text, ReadOptions{{{"width", "17"}}, false, true});
@@ -117,7 +117,7 @@ TEST_CASE("scenes: $names come from the command line before the file's defaults"
   CHECK(fault.find("h, w") != std::string::npos);
 }
 
-TEST_CASE("scenes: references may come before their target and lead into other elements") {
+TEST_CASE("scenes: references may precede their target and point into other elements") {
   const Scene scene = readBody(
       "<shape type=\"sphere\" id=\"Ball\"><ref id=\"Inner\"/></shape>"
       "<shape type=\"sphere\"><bsdf type=\"diffuse\"><ref name=\"reflectance\" id=\"Red\"/></bsdf></shape>"
@@ -134,18 +134,18 @@ TEST_CASE("scenes: references may come before their target and lead into other e
   CHECK(scene.shapes.at(1).material == 1);
   CHECK(scene.shapes.at(2).material == 0);
   CHECK((albedoOf(scene, 1) == Rgb(1, 0, 0)).all());
-  // The inner one, not the bump map around it.
+  // The nested BSDF, not the bump map around it.
   CHECK(scene.materials[0].bsdf->perturbedNormal(kUp, Vec2(0.5f, 0.5f), Vec3::UnitX(), Vec3::UnitY()) == kUp);
 }
 
-TEST_CASE("scenes: a reference in a circle is refused") {
+TEST_CASE("scenes: circular references are rejected") {
   const std::string fault = faultOf(
       "<bsdf type=\"twosided\" id=\"A\"><ref id=\"B\"/></bsdf>\n"
       "<bsdf type=\"twosided\" id=\"B\"><ref id=\"A\"/></bsdf>");
   CHECK(fault.starts_with("test.xml:2:1: a bsdf that refers to itself"));
 }
 
-TEST_CASE("scenes: transforms apply in the order given") {
+TEST_CASE("scenes: transforms are applied in the order given") {
   checkNear(moved("<translate x=\"10\"/><scale value=\"2\"/>"), {22, 4, 6});
   checkNear(moved("<scale value=\"2\"/><translate value=\"10, 0, 0\"/>"), {12, 4, 6});
   checkNear(moved("<scale x=\"3\"/>"), {3, 2, 3});
@@ -158,7 +158,7 @@ TEST_CASE("scenes: transforms apply in the order given") {
   checkNear(moved("<lookAt origin=\"0 0 5\" target=\"0 0 0\" up=\"0 1 0\"/>"), {-1, 2, 2});
 }
 
-TEST_CASE("scenes: shapes are put where their transform says") {
+TEST_CASE("scenes: shapes are placed by their transform") {
   const Scene scene = readBody(
       "<shape type=\"rectangle\"><transform name=\"toWorld\"><translate z=\"4\"/></transform></shape>"
       "<shape type=\"sphere\"><point name=\"center\" x=\"1\" y=\"2\" z=\"3\"/><float name=\"radius\" value=\"2\"/>"
@@ -174,7 +174,7 @@ TEST_CASE("scenes: shapes are put where their transform says") {
   CHECK(disk.flipped);
 }
 
-TEST_CASE("scenes: a cylinder has Mitsuba's defaults") {
+TEST_CASE("scenes: a cylinder has the defaults of Mitsuba") {
   const Scene scene = readBody("<shape type=\"cylinder\"><float name=\"radius\" value=\"2\"/></shape>");
   const auto& cylinder = std::get<Cylinder>(scene.shapes.at(0).geometry);
   checkNear(cylinder.base, {0, 0, 0});
@@ -182,7 +182,7 @@ TEST_CASE("scenes: a cylinder has Mitsuba's defaults") {
   CHECK(cylinder.u.norm() == Approx(2));
 }
 
-TEST_CASE("scenes: groups are shown by instances, before and after they are defined") {
+TEST_CASE("scenes: instances may precede or follow the definition of their group") {
   const std::string instance =
       "<shape type=\"instance\"><ref id=\"trees\"/><transform name=\"toWorld\"><translate "
       "x=\"5\"/></transform></shape>";
@@ -200,7 +200,7 @@ TEST_CASE("scenes: groups are shown by instances, before and after they are defi
   CHECK(scene.groups[0].shapes[1].material == scene.shapes[2].material);
 }
 
-TEST_CASE("scenes: meshes are read from beside the scene, with blanks in their names") {
+TEST_CASE("scenes: mesh files are relative to the scene and may have blanks in their names") {
   const TestFolder folder;
   folder.write("a mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0.25\nf 1/1 2/1 3/1\n");
   const std::string shape = "<shape type=\"obj\"><string name=\"filename\" value=\"a mesh.obj\"/>";
@@ -215,7 +215,7 @@ TEST_CASE("scenes: meshes are read from beside the scene, with blanks in their n
   CHECK(meshOf(scene, 1).uvs.at(0).y() == 0.25f);
 }
 
-TEST_CASE("scenes: the materials of an OBJ are told apart by name") {
+TEST_CASE("scenes: the materials of an OBJ are assigned by name") {
   const TestFolder folder;
   folder.write(
       "a.obj",
@@ -232,10 +232,10 @@ TEST_CASE("scenes: the materials of an OBJ are told apart by name") {
   CHECK(scene.shapes[1].name == "desk");
   CHECK(meshOf(scene, 1).triangles.size() == 2);
   CHECK((albedoOf(scene, scene.shapes[1].material) == 0.5f).all());
-  CHECK(scene.notes == std::vector<std::string>{"a.obj: no face is of material \"absent\""});
+  CHECK(scene.notes == std::vector<std::string>{"a.obj: no face has the material \"absent\""});
 }
 
-TEST_CASE("scenes: shapes without a bsdf are grey, or black where they emit") {
+TEST_CASE("scenes: shapes without a bsdf are grey or black if they emit") {
   const Scene scene = readBody(
       "<shape type=\"sphere\"/><shape type=\"disk\"><emitter type=\"area\"/></shape>"
       "<shape type=\"cube\"/>");
@@ -263,7 +263,7 @@ TEST_CASE("scenes: the field of view is measured along its axis") {
   CHECK(tangent(horizontalFov(camera, 300, 400)) == Approx(tangent(camera.fov) * 3 / 5));
 }
 
-TEST_CASE("scenes: film, filter, depth, and notes of what is replaced") {
+TEST_CASE("scenes: film and filter and depth are read and ignored elements are noted") {
   const Scene scene = readText(
       "<scene><integrator type=\"aov\"><integrator type=\"path\"><integer name=\"maxDepth\" value=\"7\"/></integrator>"
       "</integrator><sensor type=\"perspective\"><sampler type=\"sobol\"/><film type=\"hdrfilm\">"
@@ -279,20 +279,20 @@ TEST_CASE("scenes: film, filter, depth, and notes of what is replaced") {
   CHECK_FALSE(readBody("<integrator type=\"path\"><integer name=\"max_depth\" value=\"-1\"/></integrator>").maxDepth);
 }
 
-TEST_CASE("scenes: media are refused, and left out by lenient reading") {
+TEST_CASE("scenes: media are rejected and left out by lenient reading") {
   const std::string body =
       "<medium type=\"homogeneous\" id=\"Fog\"/>\n<shape type=\"sphere\">"
       "<medium type=\"homogeneous\" name=\"interior\"><rgb name=\"sigmaA\" value=\"1\"/>"
       "</medium><ref name=\"exterior\" id=\"Fog\"/></shape>";
-  CHECK_THAT(faultOf(body), Catch::StartsWith("test.xml:3:22: participating media are not rendered"));
+  CHECK_THAT(faultOf(body), Catch::StartsWith("test.xml:3:22: participating media are not supported"));
   const Scene scene = readBody(body, lenient());
   REQUIRE(scene.warnings.size() == 1);
-  CHECK_THAT(scene.warnings[0], Catch::Contains("space is clear"));
+  CHECK_THAT(scene.warnings[0], Catch::Contains("the medium is left out"));
   CHECK(scene.shapes.size() == 1);
   CHECK(faultOf("<medium type=\"homogeneous\" id=\"Unused\"/>") == "");
 }
 
-TEST_CASE("scenes: environments") {
+TEST_CASE("scenes: environments are read") {
   const Scene constant = readBody("<emitter type=\"constant\"><rgb name=\"radiance\" value=\"1 2 3\"/></emitter>");
   REQUIRE(constant.environment);
   CHECK((constant.environment->radiance.at(0, 0) == Rgb(1, 2, 3)).all());
@@ -316,7 +316,7 @@ TEST_CASE("scenes: environments") {
       faultOf("<emitter type=\"constant\"/>\n<emitter type=\"constant\"/>").starts_with("test.xml:3:1: a second env"));
 }
 
-TEST_CASE("scenes: point, spot and directional lights") {
+TEST_CASE("scenes: point and spot and directional lights") {
   const Scene scene = readBody(
       "<emitter type=\"point\"><point name=\"position\" x=\"1\" y=\"2\" z=\"3\"/>"
       "<rgb name=\"intensity\" value=\"4 5 6\"/></emitter>"
@@ -331,7 +331,8 @@ TEST_CASE("scenes: point, spot and directional lights") {
   CHECK(std::get<PointLight>(scene.lights[0]).position == Vec3(1, 2, 3));
   CHECK((std::get<PointLight>(scene.lights[0]).intensity == Rgb(4, 5, 6)).all());
   CHECK(std::get<PointLight>(scene.lights[1]).position == Vec3(7, 0, 0));
-  CHECK(scene.notes == std::vector<std::string>{"without effect on the picture: sampling_weight of emitter \"point\""});
+  CHECK(scene.notes ==
+        std::vector<std::string>{"parameters without effect on the picture: sampling_weight of emitter \"point\""});
   const auto& spot = std::get<SpotLight>(scene.lights[2]);
   CHECK(spot.position == Vec3(1, 0, 0));
   CHECK(spot.direction.isApprox(Vec3(0, -1, 0)));
@@ -343,7 +344,7 @@ TEST_CASE("scenes: point, spot and directional lights") {
   CHECK(std::get<DirectionalLight>(scene.lights[4]).direction.isApprox(Vec3(1, 0, 0), 1e-5f));
 }
 
-TEST_CASE("scenes: thin lenses, orthographic cameras, crops, shifts and filters") {
+TEST_CASE("scenes: thin lenses and orthographic cameras and crops and shifts and filters") {
   const auto sensor = [](const std::string& type, const std::string& body) {
     return readText("<scene><sensor type=\"" + type + "\">" + body + "</sensor></scene>");
   };
@@ -379,7 +380,7 @@ TEST_CASE("scenes: thin lenses, orthographic cameras, crops, shifts and filters"
   CHECK(cropped.filter.c == Approx(1.0 / 3));
 }
 
-TEST_CASE("scenes: bitmaps with wrap modes, scales, filters and encodings") {
+TEST_CASE("scenes: bitmaps with wrap modes and scales and filters and encodings") {
   const TestFolder folder;
   folder.write("a b.bmp", blackAndWhiteBmp());
   const auto lookUp = [&](const std::string& parameters, const Vec2& uv) {
@@ -403,7 +404,7 @@ TEST_CASE("scenes: bitmaps with wrap modes, scales, filters and encodings") {
   CHECK(lookUp(nearest + "<transform name=\"to_uv\"><translate x=\"0.5\"/></transform>", {0.2f, 0.5f}) == 1.0f);
 }
 
-TEST_CASE("scenes: the scale texture scales what is nested in it") {
+TEST_CASE("scenes: the scale texture scales its nested texture") {
   const Scene scene = readBody(
       "<shape type=\"sphere\"><emitter type=\"area\"><texture name=\"radiance\" type=\"scale\">"
       "<rgb name=\"scale\" value=\"2 4 6\"/><texture type=\"checkerboard\"><float name=\"color0\" value=\"0.5\"/>"
@@ -411,7 +412,7 @@ TEST_CASE("scenes: the scale texture scales what is nested in it") {
   CHECK((scene.shapes.at(0).emitter->radiance->eval(Vec2(0.1f, 0.1f)) == Rgb(1, 2, 3)).all());
 }
 
-TEST_CASE("scenes: without geometry, the materials are all there and no mesh is read") {
+TEST_CASE("scenes: reading without geometry reads all materials and no mesh") {
   ReadOptions options;
   options.geometry = false;
   const Scene scene = readText(

@@ -1,4 +1,4 @@
-// What exporters and several versions of Mitsuba write in their own ways.
+// Variants of scene files written by exporters and by several versions of Mitsuba.
 
 #include <limits>
 
@@ -17,12 +17,12 @@ std::string sceneOfVersion(const std::string& version, const std::string& body) 
   return "<scene version=\"" + version + "\">\n" + body + "\n" + kSensor + "\n</scene>\n";
 }
 
-/// Of the first material, straight from above.
+/// The albedo of the first material at normal incidence.
 Rgb albedoOf(const Scene& scene) {
   return scene.materials.at(0).bsdf->albedo(kUp, Vec2(0.25f, 0.25f));
 }
 
-/// One row of greys.
+/// An image with one row of grey pixels.
 void writeGreyExr(const std::filesystem::path& path, const std::vector<float>& row) {
   std::vector<Imf::Rgba> pixels;
   for (const float value : row) pixels.emplace_back(value, value, value);
@@ -38,7 +38,7 @@ std::string sphere(const std::string& bsdf) {
 
 }  // namespace
 
-TEST_CASE("scenes: a metal that is not named is copper to Mitsuba 0.6 and a mirror to Mitsuba 3") {
+TEST_CASE("scenes: a conductor without a material is copper for Mitsuba 0.6 and a mirror for Mitsuba 3") {
   for (const std::string type : {"conductor", "roughconductor"}) {
     const std::string body = sphere("<bsdf type=\"twosided\"><bsdf type=\"" + type + "\"/></bsdf>");
     for (const std::string version : {"2.0.0", "3.5.2"})
@@ -48,12 +48,12 @@ TEST_CASE("scenes: a metal that is not named is copper to Mitsuba 0.6 and a mirr
     const std::string copper = sphere("<bsdf type=\"" + type + "\"><string name=\"material\" value=\"Cu\"/></bsdf>");
     CHECK(albedoOf(readBody(copper)).z() < 0.6f);
   }
-  // Given only η, there k is 1: ((η − 1)² + 1) / ((η + 1)² + 1), but for the air outside.
+  // With only η given, k is 1: ((η − 1)² + 1) / ((η + 1)² + 1), up to the refractive index of air.
   const Scene half = readBody(sphere("<bsdf type=\"conductor\"><rgb name=\"eta\" value=\"2, 2, 2\"/></bsdf>"));
   CHECK(albedoOf(half).x() == Approx(0.2f).epsilon(1e-3));
 }
 
-TEST_CASE("scenes: metals by their names") {
+TEST_CASE("scenes: conductors are selected by material name") {
   const auto metal = [](const std::string& name) {
     const std::string material = "<string name=\"material\" value=\"" + name + "\"/>";
     return albedoOf(readBody(sphere("<bsdf type=\"conductor\">" + material + "</bsdf>")));
@@ -66,7 +66,7 @@ TEST_CASE("scenes: metals by their names") {
   CHECK((metal("Cu_palik") == metal("cu")).all());
 }
 
-TEST_CASE("scenes: colours out of any range are refused at their place") {
+TEST_CASE("scenes: colours out of range are rejected with their location") {
   const auto fault = [](const std::string& body) { return faultOf("\n" + body); };
   for (const std::string value : {"-0.5", "0.2, -0.1, 0.3"})
     CHECK_THAT(fault(sphere("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"" + value + "\"/></bsdf>")),
@@ -77,7 +77,7 @@ TEST_CASE("scenes: colours out of any range are refused at their place") {
                Catch::StartsWith("test.xml:3:26: ") && Catch::Contains("neither negative nor over 1e+30"));
 }
 
-TEST_CASE("scenes: spectra become colours") {
+TEST_CASE("scenes: spectra are converted to colours") {
   const auto colour = [](const std::string& element) {
     return albedoOf(readBody(sphere("<bsdf type=\"diffuse\">" + element + "</bsdf>")));
   };
@@ -102,19 +102,19 @@ TEST_CASE("scenes: spectra become colours") {
   CHECK(albedoOf(readScene(folder.write("a.xml", body("grey.spd")))).isApprox(grey(0.25f), 1e-5f));
   folder.write("falling.spd", "600 0.25\n500 0.3\n");
   CHECK_THROWS_WITH(readScene(folder.write("b.xml", body("falling.spd"))),
-                    Catch::Contains("falling.spd: does not hold"));
+                    Catch::Contains("falling.spd: each line must have a wavelength"));
   CHECK_THROWS_WITH(readScene(folder.write("c.xml", body("none.spd"))), Catch::Contains("none.spd: no such file"));
   CHECK_THAT(faultOf(sphere("<bsdf type=\"diffuse\"><spectrum name=\"reflectance\" value=\"400:1 400:2\"/></bsdf>")),
              Catch::Contains("wavelength:value"));
 }
 
-TEST_CASE("scenes: black bodies shine by Planck's law") {
+TEST_CASE("scenes: black bodies emit by Planck's law") {
   const auto radiance = [](const std::string& attributes) {
     const Scene scene =
         readBody("<emitter type=\"constant\"><blackbody name=\"radiance\" " + attributes + "/></emitter>");
     return scene.environment->radiance.at(0, 0);
   };
-  // By Planck, 1.27e13 W/(m³ sr) at the peak of 580 nm: luminance is a little below.
+  // Planck's law gives 1.27e13 W/(m³ sr) at the peak of 580 nm; the luminance is slightly lower.
   const Rgb warm = radiance("temperature=\"5000K\"");
   CHECK(luminance(warm) == Approx(1.25e4f).epsilon(0.02));
   CHECK(warm.x() > warm.y());
@@ -125,7 +125,7 @@ TEST_CASE("scenes: black bodies shine by Planck's law") {
              Catch::Contains("5000K"));
 }
 
-TEST_CASE("scenes: files included, folders to look in, and aliases") {
+TEST_CASE("scenes: includes and paths and aliases are resolved") {
   const TestFolder folder;
   std::filesystem::create_directory(folder.path() / "parts");
   folder.write("parts/metals.xml",
@@ -158,7 +158,7 @@ TEST_CASE("scenes: files included, folders to look in, and aliases") {
   CHECK_THAT(fault("<include filename='metals.xml'/>  <shape type='torus'/>"),
              Catch::StartsWith("main.xml:3:35: unknown shape type"));
   CHECK_THAT(fault("<include filename='metals.xml'/>\n<include filename='metals.xml'/>"),
-             Catch::StartsWith("parts/metals.xml:4:3: the id \"a\" is taken by the <bsdf> at") &&
+             Catch::StartsWith("parts/metals.xml:4:3: the id \"a\" is already used by the <bsdf> at") &&
                  Catch::Contains("metals.xml:4:3"));
   CHECK_THAT(fault("<include filename='none.xml'/>"),
              Catch::StartsWith("main.xml:3:1: ") && Catch::Contains("none.xml"));
@@ -169,7 +169,7 @@ TEST_CASE("scenes: files included, folders to look in, and aliases") {
   CHECK_THAT(fault("<path value='nowhere'/>"), Catch::Contains("nowhere"));
 }
 
-TEST_CASE("scenes: emitters, films, filters and samplers may stand at the top and be referred to") {
+TEST_CASE("scenes: emitters and films and filters and samplers at the top level can be referenced") {
   const Scene scene = readText(
       "<scene version=\"3.0.0\"><emitter type=\"area\" id=\"glow\"><rgb name=\"radiance\" value=\"3\"/></emitter>"
       "<sampler type=\"independent\" id=\"s\"/><rfilter type=\"tent\" id=\"r\"/>"
@@ -191,8 +191,8 @@ TEST_CASE("scenes: parameters without effect on the picture are noted in one lin
   CHECK(scene.environment->radiance.at(0, 0).x() == 2.5f);
   REQUIRE(!scene.notes.empty());
   CHECK(scene.notes.back() ==
-        "without effect on the picture: to_world of emitter \"constant\"; focus_distance, shutter_close, shutter_open "
-        "of sensor \"perspective\"");
+        "parameters without effect on the picture: to_world of emitter \"constant\"; focus_distance, shutter_close, "
+        "shutter_open of sensor \"perspective\"");
   CHECK_THAT(faultOf("<emitter type=\"constant\"><float name=\"sun_aperture\" value=\"2\"/></emitter>"),
              Catch::Contains("unknown parameter"));
   CHECK_THAT(faultOfText("<scene version=\"3.0.0\"><sensor type=\"perspective\"><film type=\"hdrfilm\">"
@@ -200,7 +200,7 @@ TEST_CASE("scenes: parameters without effect on the picture are noted in one lin
              Catch::Contains("did you mean width?"));
 }
 
-TEST_CASE("scenes: roughness as people write it") {
+TEST_CASE("scenes: roughness is accepted in all its spellings") {
   const auto rough = [](const std::string& parameters) {
     return readBody(sphere("<bsdf type=\"roughconductor\">" + parameters + "</bsdf>"));
   };
@@ -214,9 +214,9 @@ TEST_CASE("scenes: roughness as people write it") {
   const Scene phong = rough(distribution("phong") + alpha + "0.3\"/>");
   CHECK(value(phong) == value(rough(alpha + "0.3\"/>")));
   REQUIRE(phong.warnings.size() == 1);
-  CHECK_THAT(phong.warnings[0], Catch::Contains("distribution phong is taken for Beckmann's"));
+  CHECK_THAT(phong.warnings[0], Catch::Contains("distribution phong is replaced by beckmann"));
   CHECK(rough(alpha + "0\"/>").notes ==
-        std::vector<std::string>{"bsdf \"roughconductor\": alpha 0 is taken for 0.0001"});
+        std::vector<std::string>{"bsdf \"roughconductor\": alpha 0 is too small; 0.0001 is used"});
   CHECK(rough("<float name=\"alphaU\" value=\"0.3\"/>").notes.size() == 1);
   const auto ward = [&](const std::string& parameters) {
     return value(readBody(sphere("<bsdf type=\"ward\">" + parameters + "</bsdf>")));
@@ -225,7 +225,7 @@ TEST_CASE("scenes: roughness as people write it") {
         ward("<float name=\"alphaU\" value=\"0.3\"/><float name=\"alphaV\" value=\"0.3\"/>"));
 }
 
-TEST_CASE("scenes: transforms with what rounding and haste leave") {
+TEST_CASE("scenes: transforms with degenerate up vectors and rounding errors are accepted") {
   const auto centre = [](const std::string& steps) {
     const Scene scene =
         readBody("<shape type=\"sphere\"><transform name=\"to_world\">" + steps + "</transform></shape>");
@@ -239,7 +239,7 @@ TEST_CASE("scenes: transforms with what rounding and haste leave") {
              Catch::Contains("target at its origin"));
 }
 
-TEST_CASE("scenes: faulty pixels are black, with a note that names the file") {
+TEST_CASE("scenes: invalid pixels are replaced by black with a note that names the file") {
   const TestFolder folder;
   const auto note = [&](const std::string& body) {
     const Scene scene = readScene(folder.write("a.xml", sceneOf(body)));
@@ -248,7 +248,7 @@ TEST_CASE("scenes: faulty pixels are black, with a note that names the file") {
   writeGreyExr(folder.path() / "bad.exr", {-1.0f, 2.0f, std::numeric_limits<float>::quiet_NaN(), 4.0f});
   const std::string filename = "<string name=\"filename\" value=\"bad.exr\"/>";
   CHECK_THAT(note("<emitter type=\"envmap\">" + filename + "</emitter>"),
-             Catch::Contains("bad.exr: 2 of 4 pixels are negative or not finite, and count as black"));
+             Catch::Contains("bad.exr: 2 of 4 pixels are negative or not finite and are replaced by black"));
   const std::string bitmap = "<texture type=\"bitmap\" name=\"radiance\">" + filename + "</texture>";
   CHECK_THAT(note("<shape type=\"disk\"><emitter type=\"area\">" + bitmap + "</emitter></shape>"),
              Catch::Contains("bad.exr: 2 of 4 pixels"));
@@ -259,7 +259,7 @@ TEST_CASE("scenes: faulty pixels are black, with a note that names the file") {
   CHECK(scene.environment->radiance.at(1, 0).x() == 2.0f);
 }
 
-TEST_CASE("scenes: slips are told with the nearest name") {
+TEST_CASE("scenes: messages about misspelt names suggest the nearest name") {
   CHECK_THAT(faultOf("<bsdf type=\"difuse\"/>"), Catch::Contains("did you mean diffuse? known are blendbsdf"));
   CHECK_THAT(faultOf("<shape type=\"Sphere\"/>"), Catch::Contains("did you mean sphere?"));
   CHECK_THAT(faultOf("<emitter type=\"envmapp\"/>"), Catch::Contains("did you mean envmap?"));
@@ -275,7 +275,7 @@ TEST_CASE("scenes: slips are told with the nearest name") {
   CHECK_THAT(faultOf("<bsdf type=\"velvet\"/>"), !Catch::Contains("did you mean"));
 }
 
-TEST_CASE("scenes: elements nested without end are refused") {
+TEST_CASE("scenes: elements nested too deeply are rejected") {
   std::string body;
   for (int i = 0; i < 100000; ++i) body += "<bsdf type=\"twosided\">";
   for (int i = 0; i < 100000; ++i) body += "</bsdf>";

@@ -1,4 +1,4 @@
-// The illumination file: what comes back, and what is refused.
+// The illumination file: round trips and rejection of invalid files.
 
 #include <bit>
 #include <functional>
@@ -34,7 +34,7 @@ struct Opener {
   TemporaryFolder folder;
   std::filesystem::path path = folder.path / "a.illum";
 
-  /// The message that opening the bytes ends in; empty when they open.
+  /// The error message of opening a file with these bytes; empty if it succeeds.
   std::string fault(const std::vector<std::byte>& bytes) const {
     writeAtomically(path, std::span<const std::byte>(bytes));
     try {
@@ -48,7 +48,7 @@ struct Opener {
 
 }  // namespace
 
-TEST_CASE("schema: illumination reads back as written, in place") {
+TEST_CASE("schema: an illumination file reads back as written") {
   const Opener opener;
   const Content c = smallFile();
   REQUIRE(c.encode() == c.encode());
@@ -65,7 +65,7 @@ TEST_CASE("schema: illumination reads back as written, in place") {
   CHECK(file.bytes() == c.encode().size());
 }
 
-TEST_CASE("schema: illumination records in place are those of the FlatBuffers schema") {
+TEST_CASE("schema: the layout of illumination records matches the FlatBuffers schema") {
   const StoredIllumination r{{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, 10, 11, 12, 13, 14, 15, 16};
   const auto f = std::bit_cast<fb::IlluminationRecord>(r);
   CHECK((f.position().x() == 1 && f.position().y() == 2 && f.position().z() == 3));
@@ -74,14 +74,14 @@ TEST_CASE("schema: illumination records in place are those of the FlatBuffers sc
          f.bsdf_fraction() == 14 && f.first() == 15 && f.count() == 16));
 }
 
-TEST_CASE("schema: illumination of no record at all is a file, too") {
+TEST_CASE("schema: an illumination file without records is valid") {
   Content c = smallFile();
   c.records.clear();
   c.components.clear();
   CHECK(Opener().fault(c.encode()).empty());
 }
 
-TEST_CASE("schema: illumination with a flipped bit or cut short is refused") {
+TEST_CASE("schema: illumination files with a flipped bit or truncated are rejected") {
   const Opener opener;
   const std::vector<std::byte> good = smallFile().encode();
   std::string accepted;
@@ -96,7 +96,7 @@ TEST_CASE("schema: illumination with a flipped bit or cut short is refused") {
   CHECK_THAT(accepted, Catch::Equals(""));
 }
 
-TEST_CASE("schema: illumination damaged under a right hash neither crashes nor passes other exceptions") {
+TEST_CASE("schema: damaged illumination with a valid hash neither crashes nor throws other exceptions") {
   const Opener opener;
   const std::vector<std::byte> good = smallFile().encode();
   for (std::size_t i = 32; i < good.size(); ++i)
@@ -108,7 +108,7 @@ TEST_CASE("schema: illumination damaged under a right hash neither crashes nor p
     }
 }
 
-TEST_CASE("schema: illumination of other versions and files of other kinds") {
+TEST_CASE("schema: illumination files of other versions and of other kinds are rejected") {
   const Opener opener;
   std::vector<std::byte> bytes = smallFile().encode();
   const auto [kind, major, minor] = kIlluminationFormat;
@@ -125,7 +125,7 @@ TEST_CASE("schema: illumination of other versions and files of other kinds") {
   CHECK_FALSE(isOfKind(kLobeFormat, std::span(bytes).first(7)));
 }
 
-TEST_CASE("schema: faults of meaning in illumination are refused") {
+TEST_CASE("schema: invalid values in illumination files are rejected") {
   const Opener opener;
   const float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
   struct Fault {
@@ -136,12 +136,12 @@ TEST_CASE("schema: faults of meaning in illumination are refused") {
       {"not finite", [&](Content& c) { c.records[0].position[1] = nan; }},
       {"not finite", [&](Content& c) { c.records[0].radius = infinity; }},
       {"not finite", [&](Content& c) { c.records[0].samples = infinity; }},
-      {"a frame's",
+      {"not orthonormal",
        [](Content& c) {
          c.records[0].normal = {0, 0, 1.1f};
        }},
-      {"a frame's", [&](Content& c) { c.records[0].tangent[0] = nan; }},
-      {"a frame's",
+      {"not orthonormal", [&](Content& c) { c.records[0].tangent[0] = nan; }},
+      {"not orthonormal",
        [](Content& c) {
          c.records[0].tangent = {0, 0, 1};
        }},
@@ -152,9 +152,9 @@ TEST_CASE("schema: faults of meaning in illumination are refused") {
       {"negative irradiance", [](Content& c) { c.records[1].irradiance = -1; }},
       {"not finite", [&](Content& c) { c.records[1].irradiance = infinity; }},
       {"number of samples", [](Content& c) { c.records[1].samples = -1; }},
-      {"share of the BSDF", [](Content& c) { c.records[1].bsdfFraction = 0; }},
-      {"share of the BSDF", [](Content& c) { c.records[1].bsdfFraction = 1; }},
-      {"share of the BSDF", [&](Content& c) { c.records[0].bsdfFraction = nan; }},
+      {"BSDF sampling fraction", [](Content& c) { c.records[1].bsdfFraction = 0; }},
+      {"BSDF sampling fraction", [](Content& c) { c.records[1].bsdfFraction = 1; }},
+      {"BSDF sampling fraction", [&](Content& c) { c.records[0].bsdfFraction = nan; }},
       {"number of components", [](Content& c) { c.records[1].count = kMaxStoredComponents + 1; }},
       {"components out of range", [](Content& c) { c.records[0].first = 1; }},
       {"components out of range", [](Content& c) { c.records[0].first = 0xffffffffu; }},

@@ -50,7 +50,7 @@ struct Opener {
   TemporaryFolder folder;
   fs::path path = folder.path / "cache.lobe";
 
-  /// The message that opening the bytes ends in; empty when they open.
+  /// The error message of opening a file with these bytes; empty if it succeeds.
   std::string fault(const std::vector<std::byte>& bytes) const {
     std::ofstream(path, std::ios::binary)
         .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
@@ -66,7 +66,7 @@ struct Opener {
 
 }  // namespace
 
-TEST_CASE("schema: a cache reads back as written, in place") {
+TEST_CASE("schema: a cache reads back as written") {
   const TemporaryFolder folder;
   const fs::path path = folder.path / "cache.lobe";
   const Content c = smallCache();
@@ -90,7 +90,7 @@ TEST_CASE("schema: a cache reads back as written, in place") {
   CHECK(cache.components(cache.records()[1]).data() == cache.components().data() + 1);
 }
 
-TEST_CASE("schema: fields in place are those of the FlatBuffers schema") {
+TEST_CASE("schema: the layout of cache records matches the FlatBuffers schema") {
   const CacheComponent c{1, 2, 3, 4, 5, 6};
   const auto fc = std::bit_cast<fb::Component>(c);
   CHECK((fc.weight() == 1 && fc.mean_x() == 2 && fc.mean_y() == 3));
@@ -102,7 +102,7 @@ TEST_CASE("schema: fields in place are those of the FlatBuffers schema") {
   CHECK(fr.worst_ratio() == 9);
 }
 
-TEST_CASE("schema: every flipped bit and every truncation is refused") {
+TEST_CASE("schema: caches with a flipped bit or truncated are rejected") {
   const Opener opener;
   const std::vector<std::byte> good = smallCache().encode();
   REQUIRE(opener.fault(good).empty());
@@ -121,7 +121,7 @@ TEST_CASE("schema: every flipped bit and every truncation is refused") {
   CHECK_THAT(accepted, Catch::Equals(""));
 }
 
-TEST_CASE("schema: damage with a right hash neither crashes nor passes other exceptions") {
+TEST_CASE("schema: damaged caches with a valid hash neither crash nor throw other exceptions") {
   const Opener opener;
   const std::vector<std::byte> good = smallCache().encode();
   for (std::size_t i = 32; i < good.size(); ++i) {
@@ -139,7 +139,7 @@ TEST_CASE("schema: damage with a right hash neither crashes nor passes other exc
   }
 }
 
-TEST_CASE("schema: each kind of fault is named") {
+TEST_CASE("schema: errors name the kind of fault") {
   const Opener opener;
   const std::vector<std::byte> good = smallCache().encode();
   std::vector<std::byte> bytes = good;
@@ -164,7 +164,7 @@ TEST_CASE("schema: each kind of fault is named") {
   CHECK_THROWS_WITH(LobeCache::open(opener.folder.path / "none.lobe"), Catch::Contains("No such file"));
 }
 
-TEST_CASE("schema: a newer minor version is read, another major refused") {
+TEST_CASE("schema: a newer minor version is read and another major version rejected") {
   const Opener opener;
   std::vector<std::byte> bytes = smallCache().encode();
   setVersion(bytes, kLobeFormat.major, kLobeFormat.minor + 1);
@@ -175,7 +175,7 @@ TEST_CASE("schema: a newer minor version is read, another major refused") {
   CHECK(contains(opener.fault(bytes), "make the file again"));
 }
 
-TEST_CASE("schema: faults of meaning are refused") {
+TEST_CASE("schema: invalid values in caches are rejected") {
   const Opener opener;
   const float nan = std::numeric_limits<float>::quiet_NaN();
   struct Fault {
@@ -213,7 +213,7 @@ TEST_CASE("schema: faults of meaning are refused") {
   }
 }
 
-TEST_CASE("schema: a file appears whole or not at all") {
+TEST_CASE("schema: files are written completely or not at all") {
   const TemporaryFolder folder;
   const fs::path path = folder.path / "out.png";
   writeAtomically(path, std::string("first"));
@@ -233,7 +233,7 @@ TEST_CASE("schema: a file appears whole or not at all") {
   CHECK_THROWS_WITH(writeAtomically("/dev/null", std::string("x")), Catch::Contains("not a regular file"));
 }
 
-TEST_CASE("schema: a link to an output is followed, not replaced") {
+TEST_CASE("schema: writing to a symbolic link replaces its target") {
   const TemporaryFolder folder;
   writeAtomically(folder.path / "real", std::string("old"));
   fs::create_symlink("real", folder.path / "link");
@@ -244,7 +244,7 @@ TEST_CASE("schema: a link to an output is followed, not replaced") {
   CHECK(text == "new");
 }
 
-TEST_CASE("schema: a link whose target does not exist yet is written through") {
+TEST_CASE("schema: writing to a dangling symbolic link creates its target") {
   const TemporaryFolder folder;
   fs::create_directory(folder.path / "renders");
   fs::create_symlink("renders/picture", folder.path / "first");
@@ -259,7 +259,7 @@ TEST_CASE("schema: a link whose target does not exist yet is written through") {
   CHECK_THROWS_WITH(writeAtomically(folder.path / "loop", std::string("x")), Catch::Contains("loop: cannot write"));
 }
 
-TEST_CASE("schema: the file's name depends on the key alone") {
+TEST_CASE("schema: the file name depends only on model and key") {
   CHECK(lobeFileName("ggx", "a") == lobeFileName("ggx", "a"));
   CHECK(lobeFileName("ggx", "a") != lobeFileName("ggx", "b"));
   CHECK(contains(lobeFileName("ggx", "a"), ".lobe"));

@@ -1,5 +1,5 @@
 #pragma once
-// Whether two pictures may be estimates of the same light: a z-test over blocks of pixels.
+// A z-test over blocks of pixels for whether two images can be estimates of the same expected image.
 
 #include <algorithm>
 #include <cmath>
@@ -15,7 +15,7 @@ struct Block {
   double mean = 0, variance = 0;
 };
 
-/// Means over blocks of pixels and channels, with the variance of that estimate.
+/// Means over blocks of pixels and channels, with the variances of these means.
 inline std::vector<Block> blocks(const Film& film, int size) {
   const Image mean = film.mean(), variance = film.varianceOfMean();
   std::vector<Block> all;
@@ -25,7 +25,7 @@ inline std::vector<Block> blocks(const Film& film, int size) {
       for (int y = y0; y < y0 + size; ++y)
         for (int x = x0; x < x0 + size; ++x) {
           block.mean += mean.at(x, y).mean() / (size * size);
-          // Channels go up and down together: the standard deviation of their mean is at most the mean of theirs.
+          // Channels are correlated: the standard deviation of their mean is at most the mean of their deviations.
           const double deviation = variance.at(x, y).sqrt().mean();
           block.variance += deviation * deviation / std::pow(size, 4);
         }
@@ -34,8 +34,8 @@ inline std::vector<Block> blocks(const Film& film, int size) {
   return all;
 }
 
-/// No block further apart than chance allows among so many (Šidák, at 0.1 %), and not all of them together. Blocks
-/// without variance have to be equal.
+/// Whether neither any block differs significantly (level 0.1 % with Šidák's correction for the number of blocks) nor
+/// the sum of all blocks. Blocks without variance must be equal.
 inline bool agree(const std::vector<Block>& a, const std::vector<Block>& b) {
   double worst = 0, sumA = 0, sumB = 0, variance = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -47,7 +47,7 @@ inline bool agree(const std::vector<Block>& a, const std::vector<Block>& b) {
     variance += v;
   }
   const double together = sumA == sumB ? 0 : std::abs(sumA - sumB) / std::sqrt(variance);
-  const double chance = std::erfc(worst / std::sqrt(2.0));  // of one block, both sides
+  const double chance = std::erfc(worst / std::sqrt(2.0));  // of one block, two-sided
   const double level = 1 - std::pow(1 - 0.001, 1.0 / static_cast<double>(a.size()));
   UNSCOPED_INFO("worst " << worst << ", together " << together << ", ratio " << sumA / sumB);
   return chance > level && together < 3.3;

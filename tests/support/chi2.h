@@ -1,14 +1,14 @@
 #pragma once
-// Pearson's χ² test of a sampler against its density, for every sampler of the house.
+// Pearson's χ² test of a sampler against its density.
 //
 //   const Chi2Result r = chi2Sphere([&] { return mySampler(rng); }, [&](const Eigen::Vector3d& w) { return pdf(w); });
 //   INFO(r.message);
 //   CHECK(r.passed(numberOfTests));
 //
-// The bins are made from a first half of the samples, so that each holds about the same share of them: a lobe of 1/1000
-// radian is tested as finely as a wide one. The density is integrated over each bin by adaptive quadrature, refined
-// where the samples are. What the density does not cover is what the sampler must refuse (nullopt): a density that does
-// not integrate to the share of accepted samples fails, however it looks.
+// The bins are built from the first half of the samples, so that each holds about the same number of them: a lobe of
+// 1/1000 radian is tested as finely as a wide one. The density is integrated over each bin by adaptive quadrature,
+// refined where the samples are. If the density integrates to less than 1, the sampler must reject the remaining
+// fraction of samples (nullopt); a density whose integral differs from the fraction of accepted samples fails the test.
 
 #include <algorithm>
 #include <array>
@@ -27,15 +27,15 @@
 namespace lobe {
 
 struct Chi2Options {
-  int samples = 40000;         ///< for the test, after as many to make the bins
+  int samples = 40000;         ///< for the test, after the same number to build the bins
   int bins = 128;              ///< a power of two
-  double minExpected = 5.0;    ///< bins of less are merged
+  double minExpected = 5.0;    ///< bins with lower expected counts are merged
   double significance = 0.01;  ///< of all tests together
-  double massError = 3e-4;     ///< allowed for in the density's integral, for the quadrature's sake
+  double massError = 3e-4;     ///< tolerance for the quadrature error of the density's integral
 };
 
 struct Chi2Result {
-  double pValue = 0.0;  ///< 0 when the test could not be made or the density is impossible
+  double pValue = 0.0;  ///< 0 if the test is impossible or the density integrates to more than 1
   double significance = 0.01;
   std::string message;
 
@@ -52,7 +52,7 @@ struct Box {
   Point centre() const { return 0.5 * (low + high); }
 };
 
-/// Q(a, x), the upper incomplete gamma function over Γ(a): series below a + 1, continued fraction above.
+/// Q(a, x), the regularised upper incomplete gamma function: series below a + 1, continued fraction above.
 inline double upperGamma(double a, double x) {
   if (x <= 0.0) return 1.0;
   const double front = std::exp(-x + a * std::log(x) - std::lgamma(a));
@@ -97,26 +97,27 @@ inline std::array<Box, 2> halves(const Box& box, int axis) {
   return parts;
 }
 
-/// Integrates a density over boxes, halving them. A rule that misses a narrow lobe reports no error, so the samples are
-/// asked too: where they crowd, or where the rule finds next to nothing though there are some, the box is halved all
-/// the same, along the axis on which the samples take up the smaller share of it.
+/// Integrates a density over boxes by recursive bisection. A quadrature rule that misses a narrow lobe reports no
+/// error, so the samples control the refinement, too: a box is also halved if it contains many samples, or if the rule
+/// finds almost no mass in spite of some samples, along the axis on which the samples span the smaller fraction of the
+/// box.
 template <typename Density>
 class Quadrature {
  public:
   Quadrature(const Density& density, int samples) : density_(density), samples_(samples) {}
 
   double operator()(const Box& box, std::span<Point> points, int depth = 0) const {
-    constexpr std::size_t kCrowd = 12;
-    constexpr int kDeepest = 60;
+    constexpr std::size_t kManySamples = 12;
+    constexpr int kMaxDepth = 60;
     constexpr double kTolerance = 4e-7;
-    int axis = crampedAxis(box, points, depth);
-    if (points.size() <= kCrowd || depth == kDeepest) {
+    int axis = narrowAxis(box, points, depth);
+    if (points.size() <= kManySamples || depth == kMaxDepth) {
       const double whole = gauss(density_, box);
       const double x = halved(box, 0);
       const double y = halved(box, 1);
       const double error = std::max(std::abs(x - whole), std::abs(y - whole));
       const bool plausible = 0.5 * (x + y) * samples_ >= 0.02 * static_cast<double>(points.size());
-      if (depth == kDeepest || (plausible && error < kTolerance)) return x + y - whole;
+      if (depth == kMaxDepth || (plausible && error < kTolerance)) return x + y - whole;
       if (plausible) axis = std::abs(x - whole) > std::abs(y - whole) ? 0 : 1;
     }
     const std::array<Box, 2> parts = halves(box, axis);
@@ -132,7 +133,7 @@ class Quadrature {
     return gauss(density_, parts[0]) + gauss(density_, parts[1]);
   }
 
-  static int crampedAxis(const Box& box, std::span<const Point> points, int depth) {
+  static int narrowAxis(const Box& box, std::span<const Point> points, int depth) {
     if (points.empty()) return depth % 2;
     Point low = points.front();
     Point high = low;
@@ -153,7 +154,7 @@ struct Bin {
   double observed = 0.0;
 };
 
-/// Bins of equal shares of the points, by splitting at medians.
+/// A tree of bins with equal numbers of points, split at medians.
 class BinTree {
  public:
   BinTree(const Box& box, std::span<Point> points, int depth, std::vector<Bin>& bins) {
@@ -167,7 +168,7 @@ class BinTree {
     std::nth_element(points.begin(), middle, points.end(),
                      [&](const Point& a, const Point& b) { return a[axis_] < b[axis_]; });
     cut_ = (*middle)[axis_];
-    // Equal points (a sampler with few values) must not straddle the cut.
+    // Equal points (of a sampler with few distinct values) must not end up on both sides of the cut.
     const auto upper = std::partition(points.begin(), points.end(), [&](const Point& p) { return p[axis_] < cut_; });
     const auto count = static_cast<std::size_t>(upper - points.begin());
     Box low = box;
@@ -189,7 +190,7 @@ class BinTree {
   std::vector<BinTree> children_;
 };
 
-/// χ² over the bins, the small ones merged.
+/// The χ² test over the bins, with small bins merged.
 inline Chi2Result judge(std::vector<Bin> bins, const Chi2Options& options) {
   std::sort(bins.begin(), bins.end(), [](const Bin& a, const Bin& b) { return a.expected < b.expected; });
   Bin pool;
@@ -223,7 +224,7 @@ inline Chi2Result judge(std::vector<Bin> bins, const Chi2Options& options) {
   }
   result.pValue = upperGamma(0.5 * (cells - 1), 0.5 * statistic);
   message << "chi2 = " << statistic << ", cells = " << cells << ", p = " << result.pValue
-          << "; worst cell (0 to 0: the merged or the refused) [" << worst->box.low.transpose() << "] to ["
+          << "; worst cell (0 to 0: merged or rejected) [" << worst->box.low.transpose() << "] to ["
           << worst->box.high.transpose() << "]: observed " << worst->observed << ", expected " << worst->expected;
   result.message = message.str();
   return result;
@@ -231,9 +232,9 @@ inline Chi2Result judge(std::vector<Bin> bins, const Chi2Options& options) {
 
 }  // namespace chi2_detail
 
-/// A sampler of the unit square: sampler() gives std::optional<Eigen::Vector2d>, density(Eigen::Vector2d) its density
-/// over the square. A sample outside the square counts as nullopt. breaks: abscissae in (0,1) where the density jumps;
-/// no bin crosses them.
+/// Tests a sampler of the unit square: sampler() returns std::optional<Eigen::Vector2d>, density(Eigen::Vector2d) its
+/// density over the square. A sample outside the square counts as nullopt. breaks: x coordinates in (0,1) at which the
+/// density is discontinuous; no bin crosses them.
 template <typename Sampler, typename Density>
 Chi2Result chi2Square(Sampler&& sampler, Density&& density, const Chi2Options& options = {},
                       std::vector<double> breaks = {}) {
@@ -262,11 +263,11 @@ Chi2Result chi2Square(Sampler&& sampler, Density&& density, const Chi2Options& o
     low = high;
   }
 
-  Bin refused;
+  Bin rejected;
   for (int i = 0; i < options.samples; ++i) {
     const std::optional<Point> p = draw();
     if (!p) {
-      refused.observed += 1.0;
+      rejected.observed += 1.0;
       continue;
     }
     const auto at = std::upper_bound(breaks.begin(), breaks.end() - 1, p->x()) - breaks.begin();
@@ -282,17 +283,18 @@ Chi2Result chi2Square(Sampler&& sampler, Density&& density, const Chi2Options& o
   }
   if (!(mass <= 1.0 + options.massError))
     return {0.0, options.significance, "the density integrates to " + std::to_string(mass)};
-  // Below the quadrature's error nothing can be said of what is refused.
-  refused.expected = std::max(1.0 - mass, options.massError) * options.samples;
-  if (std::max(refused.expected, refused.observed) > 2.0 * options.massError * options.samples) bins.push_back(refused);
+  // The fraction of rejected samples cannot be tested below the error of the quadrature.
+  rejected.expected = std::max(1.0 - mass, options.massError) * options.samples;
+  if (std::max(rejected.expected, rejected.observed) > 2.0 * options.massError * options.samples)
+    bins.push_back(rejected);
   Chi2Result result = judge(std::move(bins), options);
-  result.message += "; density integrates to " + std::to_string(mass) + ", refused " +
-                    std::to_string(refused.observed / options.samples);
+  result.message += "; density integrates to " + std::to_string(mass) + ", rejected " +
+                    std::to_string(rejected.observed / options.samples);
   return result;
 }
 
-/// The same for directions: sampler() gives std::optional<Eigen::Vector3f>, density(Eigen::Vector3f) is over solid
-/// angle. The square is (elevation, azimuth), equal in area, and exact near both poles.
+/// The same for directions: sampler() returns std::optional<Eigen::Vector3f>, density(Eigen::Vector3f) is over solid
+/// angle. Directions are mapped to the square by an area-preserving map of (elevation, azimuth), precise at both poles.
 template <typename Sampler, typename Density>
 Chi2Result chi2Sphere(Sampler&& sampler, Density&& density, const Chi2Options& options = {}) {
   constexpr double kTwoPi = 2.0 * std::numbers::pi;

@@ -1,5 +1,5 @@
 #pragma once
-// What the fitter's tests share.
+// Lobes, directions and checks for the fitter's tests.
 
 #include <catch2/catch.hpp>
 #include <cmath>

@@ -1,5 +1,5 @@
 #pragma once
-// What the tests of loberender share: a scene in a folder of its own, and runs that have to fail.
+// Helpers for the tests of loberender: a scene in a temporary folder, and runs that must fail.
 
 #include <filesystem>
 #include <set>
@@ -11,7 +11,7 @@
 
 namespace lobe::test {
 
-// Two metals of one lobe and one of another under a light, on a diffuse floor.
+// Three metal spheres with two different lobes under a light, on a diffuse floor.
 inline const char* const kScene = R"(<scene version="0.6.0">
   <sensor type="perspective"><float name="fov" value="50"/>
     <transform name="toWorld"><lookat origin="0, 2, 6" target="0, 0.5, 0" up="0, 1, 0"/></transform>
@@ -36,7 +36,7 @@ inline const std::string kTraining = " --passes 1 --photons 2000 --importons 100
 inline const std::string kRender = "loberender scene.xml -o a.exr --spp 2" + kTraining;
 inline const std::string kQuickFit = "lobefit scene.xml --elevations 4 --samples 256";
 
-/// A folder with the scene in it and, when asked for, its caches.
+/// A folder with the scene and, if requested, its caches.
 class SceneFolder : public Folder {
  public:
   explicit SceneFolder(bool caches) {
@@ -53,7 +53,7 @@ class SceneFolder : public Folder {
     for (const auto& entry : std::filesystem::directory_iterator(*this / "lobes")) all.push_back(entry.path());
     return all;
   }
-  /// Names of everything there.
+  /// Paths of all files and folders inside, relative to the folder.
   std::set<std::string> names() const {
     std::set<std::string> all;
     for (const auto& entry : std::filesystem::recursive_directory_iterator(path()))
@@ -62,7 +62,7 @@ class SceneFolder : public Folder {
   }
 };
 
-/// The command fails with the code and one line, and writes nothing. Returns the line.
+/// Checks that the command fails with this exit code and a one-line error and writes nothing. Returns the line.
 inline std::string fault(const SceneFolder& folder, const std::string& command, int code) {
   const std::set<std::string> before = folder.names();
   const ToolRun run = folder.run(command);

@@ -1,5 +1,5 @@
 #pragma once
-// What the tests of materials/ share.
+// Helpers for the tests of materials/.
 
 #include <cmath>
 #include <initializer_list>

@@ -1,5 +1,5 @@
 #pragma once
-// Files of measured materials, made for a test.
+// Creates files of measured materials for tests.
 
 #include <cmath>
 #include <cstdint>
@@ -34,7 +34,7 @@ inline TestField floatField(const std::string& name, std::vector<std::uint64_t> 
   return {name, 10, std::move(shape), bytesOf(values)};
 }
 
-/// A tensor file, as text that holds its bytes.
+/// The bytes of a tensor file.
 inline std::string tensorFile(const std::vector<TestField>& fields) {
   std::size_t offset = 18;
   for (const TestField& field : fields) offset += 13 + field.name.size() + 8 * field.shape.size();
@@ -57,8 +57,8 @@ inline Eigen::Vector3d fromAngles(double theta, double phi) {
   return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
 }
 
-/// The fields of a measured material of which the visible normals are uniform over their square, so that the tables of
-/// colours are over half vectors; phi: one azimuth of an isotropic material, or several.
+/// The fields of a measured material whose visible normals are uniform over their square, so that the tables of colours
+/// are over half vectors. phi: one azimuth for an isotropic material, or several.
 inline std::vector<TestField> measuredFields(const Brdf& brdf, const std::vector<float>& phi, std::uint64_t size) {
   constexpr double kPiD = std::numbers::pi;
   std::vector<float> theta;
@@ -75,9 +75,9 @@ inline std::vector<TestField> measuredFields(const Brdf& brdf, const std::vector
           const Eigen::Vector3d wo = fromAngles(t, azimuthScale * p);
           const Eigen::Vector3d half = fromAngles(0.5 * kPiD * u * u, (2.0 * v - 1.0) * kPiD);
           const Eigen::Vector3d wi = 2.0 * wo.dot(half) * half - wo;
-          // The model's value below the horizon, too: interpolation crosses it.
+          // Evaluated below the horizon, too, because interpolation crosses it.
           values.push_back(wo.dot(half) > 0.0 ? Rgb(brdf(wo, wi) * static_cast<float>(std::abs(wi.z()))) : Rgb::Zero());
-          // What is to be sampled is this times the half vectors' Jacobian.
+          // The density to be sampled is this value times the Jacobian of half vectors.
           luminances.push_back(luminance(values.back()) * static_cast<float>(u * std::sin(0.5 * kPiD * u * u)) + 1e-6f);
         }
       for (Eigen::Index channel = 0; channel < 3; ++channel)
@@ -95,7 +95,7 @@ inline std::vector<TestField> measuredFields(const Brdf& brdf, const std::vector
           {"description", 1, {4}, "test"}};
 }
 
-/// A MERL file of the BRDF at the middles of its bins, as text that holds its bytes.
+/// The bytes of a MERL file with the values of the BRDF at the centres of its bins.
 inline std::string merlFile(const Brdf& brdf) {
   constexpr double kPiD = std::numbers::pi;
   constexpr std::size_t kBins = 90 * 90 * 180;
@@ -106,7 +106,7 @@ inline std::string merlFile(const Brdf& brdf) {
     const double half = 0.5 * kPiD * root * root;
     const Eigen::Vector3d d = fromAngles((static_cast<double>(bin / 180 % 90) + 0.5) * kPiD / 180.0,
                                          (static_cast<double>(bin % 180) + 0.5) * kPiD / 180.0);
-    // From the half vector's frame to the surface's.
+    // From the frame of the half vector to that of the surface.
     const auto turned = [&](const Eigen::Vector3d& w) {
       return Eigen::Vector3d(std::cos(half) * w.x() + std::sin(half) * w.z(), w.y(),
                              std::cos(half) * w.z() - std::sin(half) * w.x());

@@ -1,6 +1,6 @@
 #pragma once
-// What the tests of the mixtures share: random mixtures, quadrature over the plane, and a chi² test of a sampler of the
-// plane against its density.
+// Helpers for the tests of mixtures: random mixtures, quadrature over the plane, and a chi² test of a planar sampler
+// against its density.
 
 #include <cmath>
 #include <functional>
@@ -22,7 +22,7 @@ inline Gaussian makeGaussian(float weight, Vec2 mean, float along, float across,
   return turned;
 }
 
-/// Means anywhere in the disc of the given radius, widths log-uniform in [narrow, wide]; the weights sum to `mass`.
+/// Means uniform in the disc of the given radius, widths log-uniform in [narrow, wide]; the weights sum to `mass`.
 inline Mixture randomMixture(Rng& rng, int count, float narrow, float wide, float radius = 0.9f, float mass = 1) {
   Mixture mixture;
   float sum = 0;
@@ -37,7 +37,7 @@ inline Mixture randomMixture(Rng& rng, int count, float narrow, float wide, floa
   return mixture;
 }
 
-/// A square of the plane.
+/// A square in the plane.
 struct Window {
   Vec2 centre;
   float half;
@@ -57,8 +57,8 @@ double integrate(const Window& w, int n, const F& f) {
   return sum * 4.0 * w.half * w.half / (static_cast<double>(n) * n);
 }
 
-/// The p value of a sampler of the plane against a density that integrates to one over it; samples outside the window
-/// only have to be as many as the density says. 0 if a draw is not finite.
+/// The p-value of a planar sampler for a density that integrates to one over the plane; of the samples outside the
+/// window only the number is tested. Returns 0 if a sample is not finite.
 inline double chi2PValue(const Window& w, const std::function<Vec2(Rng&)>& sample,
                          const std::function<double(const Vec2&)>& pdf) {
   Rng rng(11);
@@ -76,7 +76,7 @@ inline double chi2PValue(const Window& w, const std::function<Vec2(Rng&)>& sampl
   return finite ? p : 0;
 }
 
-/// A p value below this fails: 1 % over `tests` tests (Šidák).
+/// Significance level of one of `tests` tests for 1 % over all of them (Šidák correction).
 inline double sidak(int tests) {
   return 1 - std::pow(0.99, 1.0 / tests);
 }

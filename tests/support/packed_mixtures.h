@@ -1,5 +1,5 @@
 #pragma once
-// Mixtures in the form that the kernels take, for tests.
+// Mixtures in the data layout of the kernels, for tests.
 
 #include <vector>
 
@@ -10,7 +10,7 @@
 
 namespace lobe {
 
-/// A mixture in lanes.
+/// A mixture packed as a structure of arrays.
 class Packed {
  public:
   explicit Packed(const Mixture& mixture, int stride = GaussianStore<kMaxReflectanceComponents>::kStride)
@@ -30,7 +30,7 @@ inline Packed packedLight(const Mixture& mixture) {
   return Packed(mixture, mixture.size() <= kPaddingMultiple ? kPaddingMultiple : kMaxLightComponents);
 }
 
-/// A product with its factors.
+/// A product that owns its factors.
 struct OwnedProduct {
   OwnedProduct(const Mixture& one, float constant, const Mixture& two)
       : reflectance(one), light(packedLight(two)), product(reflectance.view(), constant, light.view()) {}
@@ -43,7 +43,7 @@ struct OwnedProduct {
   Product product;
 };
 
-/// Does the same with every instruction set that this machine has.
+/// Calls check with every instruction set that this machine supports.
 template <class F>
 void onAllTargets(const F& check) {
   for (const std::int64_t target : kernelTargets()) {

@@ -1,5 +1,5 @@
 #pragma once
-// The product of two mixtures in double precision, pair by pair as it is defined: what the kernels are tested against.
+// Reference product of two mixtures, pair by pair in double precision, for the tests of the kernels.
 
 #include <cmath>
 #include <numbers>
@@ -39,8 +39,8 @@ inline double exactMass(std::span<const Gaussian> reflectance, double constant, 
   return sum;
 }
 
-/// The product's density by the definition that needs no evaluation of the factors: Σ over all pairs of their share
-/// times the normal density of their product, each with its own mean and covariance (the paper's form).
+/// The product's density as a mixture over all pairs of components, each with its own mean and covariance (the form of
+/// Herholz et al. 2016), without evaluating the factors.
 inline double exactProductPdf(std::span<const Gaussian> reflectance, std::span<const Gaussian> light, double x,
                               double y) {
   double sum = 0;

@@ -1,5 +1,5 @@
 #pragma once
-// Scenes made in code, plain materials and statistics for the render tests.
+// Procedural scenes, simple materials and statistics for the render tests.
 
 #include <cmath>
 #include <filesystem>
@@ -14,7 +14,7 @@
 
 namespace lobe::test {
 
-/// Lambert on both sides.
+/// A two-sided Lambertian reflector.
 class Diffuse : public Bsdf {
  public:
   explicit Diffuse(float albedo) : albedo_(albedo) {}
@@ -37,7 +37,7 @@ class Diffuse : public Bsdf {
   float albedo_;
 };
 
-/// Half of the time a perfect mirror of reflectance `mirror`, else Lambert; the delta share is what it is told to be.
+/// A perfect mirror of reflectance `mirror` plus a Lambertian; `fraction` is the probability of sampling the mirror.
 class HalfMirror : public Diffuse {
  public:
   HalfMirror(float albedo, float mirror, float fraction) : Diffuse(albedo), mirror_(mirror), fraction_(fraction) {}
@@ -50,7 +50,7 @@ class HalfMirror : public Diffuse {
   float mirror_, fraction_;
 };
 
-/// The rectangle a, a+u, a+u+v, a+v; its front is that of u × v.
+/// The rectangle a, a+u, a+u+v, a+v; u × v points to its front.
 inline TriangleMesh rectangle(const Vec3& a, const Vec3& u, const Vec3& v) {
   TriangleMesh mesh;
   mesh.positions = {a, a + u, a + u + v, a + v};
@@ -59,7 +59,7 @@ inline TriangleMesh rectangle(const Vec3& a, const Vec3& u, const Vec3& v) {
   return mesh;
 }
 
-/// A closed axis-aligned box with its front outside, or inside.
+/// A closed axis-aligned box whose front faces outward, or inward.
 inline TriangleMesh box(const Vec3& low, const Vec3& high, bool inward) {
   TriangleMesh mesh;
   for (int i = 0; i < 8; ++i)
@@ -71,7 +71,7 @@ inline TriangleMesh box(const Vec3& low, const Vec3& high, bool inward) {
   return mesh;
 }
 
-/// A mesh of a sphere, with the sphere's normals: triangles at all angles.
+/// A tessellated sphere with smooth normals.
 inline TriangleMesh sphereMesh(const Vec3& centre, float radius, int rings) {
   TriangleMesh mesh;
   for (int i = 0; i <= rings; ++i)
@@ -109,7 +109,7 @@ inline Environment environment(Image image) {
   return {std::move(image), Eigen::Matrix3f::Identity()};
 }
 
-/// Mean and error of numbers that are added.
+/// Running mean and standard error.
 class Moments {
  public:
   void add(double x) {
@@ -125,18 +125,18 @@ class Moments {
   double n_ = 0, mean_ = 0, squares_ = 0;
 };
 
-/// How many standard errors the mean is from the truth; a part in 10⁵ is left to rounding.
+/// Distance of the mean from the truth in standard errors; a relative error of 10⁻⁵ is allowed for rounding.
 inline double deviation(const Moments& m, double truth) {
   return std::abs(m.mean() - truth) / std::hypot(m.error(), 1e-5 * truth);
 }
-/// The same for two estimates of one number.
+/// The same for two estimates of the same quantity.
 inline double deviation(const Moments& a, const Moments& b) {
   return std::abs(a.mean() - b.mean()) / std::hypot(a.error(), b.error(), 1e-5 * a.mean());
 }
-/// Chance exceeds it once in 15 000 times.
+/// Exceeded by chance with probability 1/15 000.
 inline constexpr double kMaxDeviation = 4.0;
 
-/// Green channel of n estimates along one ray.
+/// The green channel of n radiance estimates along one ray.
 inline Moments estimate(const Integrator& integrator, const Ray& ray, int n, std::uint64_t seed = 7) {
   Moments moments;
   PathStatistics statistics;

@@ -1,5 +1,5 @@
 #pragma once
-// Scene files written for a test, and the ways to read them.
+// Writes scene files for tests and reads them.
 
 #include <cstdlib>
 #include <filesystem>
@@ -11,12 +11,12 @@
 
 namespace lobe {
 
-/// A folder of its own that is gone after the test.
+/// A temporary folder that is removed after the test.
 class TestFolder {
  public:
   TestFolder() {
     std::string name = (std::filesystem::temp_directory_path() / "lobe-scenes-XXXXXX").string();
-    if (!mkdtemp(name.data())) throw std::runtime_error("cannot make a folder for the test");
+    if (!mkdtemp(name.data())) throw std::runtime_error("cannot create a folder for the test");
     path_ = name;
   }
   ~TestFolder() { std::filesystem::remove_all(path_); }
@@ -35,7 +35,7 @@ class TestFolder {
 
 inline constexpr const char* kSensor = "<sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/></sensor>";
 
-/// A scene of which the body starts at line 2, column 1, and which has a sensor at its end.
+/// A scene whose body starts at line 2, column 1, followed by a sensor.
 inline std::string sceneOf(const std::string& body) {
   return "<scene version=\"3.0.0\">\n" + body + "\n" + kSensor + "\n</scene>\n";
 }

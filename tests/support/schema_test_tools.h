@@ -1,5 +1,5 @@
 #pragma once
-// What the tests of cache files share: a folder, and files that are wrong in one thing only.
+// Helpers for the tests of cache files: a temporary folder, and files with a single defect.
 
 #include <unistd.h>
 
@@ -13,7 +13,7 @@
 
 namespace lobe::test {
 
-/// A folder of the test's own, removed at its end.
+/// A temporary folder that is removed in the destructor.
 struct TemporaryFolder {
   std::filesystem::path path;
   TemporaryFolder() {
@@ -28,7 +28,7 @@ struct TemporaryFolder {
   }
 };
 
-/// Makes header and hash right for whatever is in the bytes.
+/// Updates the size and the hash in the header after a change of the bytes.
 inline void reseal(std::vector<std::byte>& bytes) {
   const std::uint64_t size = bytes.size() - 32;
   std::memcpy(bytes.data() + 16, &size, 8);

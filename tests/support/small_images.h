@@ -1,5 +1,5 @@
 #pragma once
-// PNG files of a few pixels, made byte by byte.
+// Creates PNG files with a few pixels byte by byte.
 
 #include <cstdint>
 #include <string>
@@ -12,7 +12,7 @@ inline std::string bigEndian(std::uint32_t value) {
   return bytes;
 }
 
-/// Without a right checksum, which our reader does not mind.
+/// The checksum is invalid, because our reader ignores it.
 inline std::string chunk(const std::string& name, const std::string& data) {
   return bigEndian(static_cast<std::uint32_t>(data.size())) + name + data + "none";
 }

@@ -1,5 +1,5 @@
 #pragma once
-// A scene with its caches and its trained illumination, as tests render it.
+// A scene with its caches and trained incident radiance, for tests that render.
 
 #include <optional>
 
@@ -15,8 +15,8 @@
 
 namespace lobe::test {
 
-/// Everything that rendering a scene by every integrator takes, with coarse caches and little training: estimates have
-/// to be right however rough the mixtures are.
+/// Everything needed to render a scene with each integrator. Caches are coarse and training is short, since estimates
+/// must be unbiased however inaccurate the mixtures are.
 class Studio {
  public:
   explicit Studio(Scene s, int width, int height) : scene_(std::move(s)) {

@@ -1,5 +1,5 @@
 #pragma once
-// For tests that run our binaries as users do: a folder of their own, a command, and what came of it.
+// Helpers for tests that run the command-line tools: a temporary folder, a command and its output.
 
 #include <algorithm>
 #include <array>
@@ -17,7 +17,7 @@
 
 namespace lobe::test {
 
-/// A folder of a test's own, removed with everything in it.
+/// A temporary folder that is removed with its content in the destructor.
 class Folder {
  public:
   Folder() {
@@ -48,11 +48,11 @@ inline long lineCount(const std::string& text) {
 }
 
 struct ToolRun {
-  int code;  ///< -1: ended by a signal
+  int code;  ///< exit code, −1 if ended by a signal
   std::string out, error;
 };
 
-/// Runs a shell command in folder, one of our binaries first. Leaves nothing in the folder itself.
+/// Runs one of our tools in folder through the shell. The captured output is stored elsewhere.
 inline ToolRun runBinary(const std::filesystem::path& folder, const std::string& arguments) {
   const Folder caught;
   const std::filesystem::path out = caught / "out", error = caught / "error";

@@ -1,4 +1,4 @@
-// Illumination kept in files: train once, render elsewhere, in parts.
+// Illumination files: train once, then render elsewhere or in parts.
 
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
@@ -16,7 +16,7 @@ const std::string kSave = "loberender scene.xml --spp 2 -o trained.exr --save-il
 
 }  // namespace
 
-TEST_CASE("loberender: what was trained once renders the same picture again") {
+TEST_CASE("loberender: rendering with saved illumination reproduces the image") {
   const SceneFolder folder(true);
   for (const std::string integrator : {" --integrator product", " --integrator guided"}) {
     REQUIRE(folder.run(kSave + integrator + " --threads 2").code == 0);
@@ -36,7 +36,7 @@ TEST_CASE("loberender: what was trained once renders the same picture again") {
   }
 }
 
-TEST_CASE("loberender: product says when its illumination has learnt no shares") {
+TEST_CASE("loberender: product notes illumination without learnt BSDF sampling fractions") {
   const SceneFolder folder(true);
   const std::string note = "have learnt no BSDF sampling fractions";
   const auto noteOf = [&](const std::string& integrator) {
@@ -56,12 +56,12 @@ TEST_CASE("loberender: product says when its illumination has learnt no shares")
       "loberender scene.xml --spp 1 -o a.exr --bsdf-fraction fixed --passes 1 --photons 100 --importons 100 "
       "--integrator ";
   CHECK_THAT(folder.run(unused + "path").error,
-             Catch::Contains("path has no use for --passes, --photons, --importons, --bsdf-fraction"));
-  CHECK_THAT(folder.run(unused + "guided").error, Catch::Contains("guided has no use for --bsdf-fraction"));
-  CHECK_THAT(folder.run(unused + "product").error, !Catch::Contains("no use for"));
+             Catch::Contains("path ignores --passes, --photons, --importons, --bsdf-fraction"));
+  CHECK_THAT(folder.run(unused + "guided").error, Catch::Contains("guided ignores --bsdf-fraction"));
+  CHECK_THAT(folder.run(unused + "product").error, !Catch::Contains("ignores"));
 }
 
-TEST_CASE("loberender: illumination serves other cameras of a scene, and no other scene") {
+TEST_CASE("loberender: illumination can be used with other cameras but not with other scenes") {
   const SceneFolder folder(false);
   const std::string guided = " --integrator guided --spp 1";
   REQUIRE(folder.run(kSave + " --integrator guided").code == 0);
@@ -76,7 +76,7 @@ TEST_CASE("loberender: illumination serves other cameras of a scene, and no othe
                                         Catch::Contains("/scene.xml") && Catch::Contains("--save-illumination"));
 }
 
-TEST_CASE("loberender: illumination that is no such file is refused in words") {
+TEST_CASE("loberender: errors explain why an illumination file is invalid") {
   const SceneFolder folder(true);
   REQUIRE(folder.run(kSave).code == 0);
   const std::string whole = folder.bytes("a.illum");
@@ -96,7 +96,7 @@ TEST_CASE("loberender: illumination that is no such file is refused in words") {
   CHECK_THAT(fault(folder, use + "none", 1), Catch::Contains("a.illumnone: cannot open"));
 }
 
-TEST_CASE("loberender: options that contradict a file of illumination") {
+TEST_CASE("loberender: options that conflict with an illumination file are errors") {
   const SceneFolder folder(false);
   const std::vector<std::pair<std::string, std::string>> cases{
       {" --illumination a.illum --passes 1", "--passes"},
@@ -108,8 +108,8 @@ TEST_CASE("loberender: options that contradict a file of illumination") {
       {" --components 9", "--components"},
       {" --photons 0", "--photons"},
       {" --illumination a.illum --save-illumination b.illum", "--save-illumination"},
-      {" --illumination a.illum --integrator path", "path has none"},
-      {" --save-illumination a.illum --integrator path", "path has none"},
+      {" --illumination a.illum --integrator path", "require --integrator guided or product"},
+      {" --save-illumination a.illum --integrator path", "require --integrator guided or product"},
       {" --save-illumination a.exr", "a.exr"},
       {" --sample-offset -1", "--sample-offset"},
       {" --sample-offset 2147483647", "at most 2147483647"}};
@@ -120,7 +120,7 @@ TEST_CASE("loberender: options that contradict a file of illumination") {
              Catch::Contains("cannot write"));
 }
 
-TEST_CASE("loberender: parts of a picture merge to the whole") {
+TEST_CASE("loberender: partial renderings merge into the whole image") {
   const SceneFolder folder(false);
   const std::string render = "loberender scene.xml --integrator guided --illumination a.illum";
   REQUIRE(folder.run(kSave + " --integrator guided").code == 0);
@@ -128,7 +128,7 @@ TEST_CASE("loberender: parts of a picture merge to the whole") {
   REQUIRE(folder.run(render + " --spp 3 -o a.exr").code == 0);
   REQUIRE(folder.run(render + " --spp 4 --sample-offset 3 -o b.exr").code == 0);
   REQUIRE(folder.run(render + " --spp 1 --sample-offset 7 -o c.exr").code == 0);
-  // Two of them first: what was merged can be merged again.
+  // A merged image can be merged again.
   REQUIRE(folder.run("lobecompare --merge bc.exr c.exr b.exr").code == 0);
   REQUIRE(folder.run("lobecompare --merge merged.exr a.exr bc.exr").code == 0);
 
@@ -143,7 +143,8 @@ TEST_CASE("loberender: parts of a picture merge to the whole") {
 
   const ToolRun overlap = folder.run("lobecompare --merge d.exr a.exr whole.exr");
   CHECK(overlap.code == 1);
-  CHECK_THAT(overlap.error, Catch::Contains("a.exr and whole.exr: both have samples 0 to 2 of seed 1 by guided"));
+  CHECK_THAT(overlap.error,
+             Catch::Contains("a.exr and whole.exr: both contain samples 0 to 2 of seed 1 and integrator guided"));
   CHECK_FALSE(folder.has("d.exr"));
 
   REQUIRE(folder.run("loberender scene.xml --integrator path --spp 1 --size 4x4 -o other.exr").code == 0);
@@ -153,14 +154,14 @@ TEST_CASE("loberender: parts of a picture merge to the whole") {
   CHECK_THAT(folder.run("lobecompare --merge d.exr a.exr none.exr").error, Catch::Contains("none.exr: no such file"));
 }
 
-TEST_CASE("lobedump: shows illumination to people, machines and viewers of points") {
+TEST_CASE("lobedump: shows illumination as text and JSON and as a point cloud") {
   const SceneFolder folder(true);
   REQUIRE(folder.run(kSave).code == 0);
   const ToolRun text = folder.run("lobedump a.illum");
   CHECK(text.code == 0);
   CHECK_THAT(text.out,
              Catch::Contains("/scene.xml, hash") && Catch::Contains("from both, 1 passes of 2000 photons and 1000") &&
-                 Catch::Contains("radius") && Catch::Contains("undersampled") && Catch::Contains("learnt shares"));
+                 Catch::Contains("radius") && Catch::Contains("undersampled") && Catch::Contains("learnt fractions"));
   const auto json = nlohmann::json::parse(folder.run("lobedump --json a.illum").out).at(0);
   const long records = json.at("record_count");
   REQUIRE(records > 1);

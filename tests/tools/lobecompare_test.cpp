@@ -1,4 +1,4 @@
-// lobecompare as its users see it: output, exit codes, one-line errors.
+// Output, exit codes and one-line errors of lobecompare.
 
 #include <filesystem>
 #include <string>
@@ -20,7 +20,7 @@ ToolRun lobecompare(const std::string& arguments) {
 
 }  // namespace
 
-TEST_CASE("render: lobecompare tells errors to people and machines") {
+TEST_CASE("render: lobecompare prints error metrics as text and JSON") {
   const Folder folder;
   const std::string reference = folder / "reference.exr", image = folder / "image.exr";
   writeImage(reference, Image(10, 10, grey(0.5f)));
@@ -61,7 +61,8 @@ TEST_CASE("render: lobecompare tells errors to people and machines") {
     CHECK(nlohmann::json::parse(run.out)[0]["mse"].get<double>() == Approx(0.01));
     const ToolRun uneven = lobecompare(large + " " + image + " --shrink 3");
     CHECK(uneven.code == 1);
-    CHECK(uneven.error == fmt::format("lobecompare: error: {}: 20x20 pixels are not squares of 3 a side\n", large));
+    CHECK(uneven.error ==
+          fmt::format("lobecompare: error: {}: 20x20 pixels cannot be divided into blocks of 3x3\n", large));
     CHECK(lobecompare(large + " " + image + " --shrink 0").code == 2);
   }
   SECTION("faults") {

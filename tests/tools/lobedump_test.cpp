@@ -1,4 +1,4 @@
-// What lobedump shows: grades, plots and differences.
+// Grades, plots and differences shown by lobedump.
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -23,14 +23,14 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// f/p in units of ∫ f dω, the defensive density written out once more.
+/// f/p in units of ∫ f dω with an independent implementation of the defensive density.
 double ratioAt(const Lobe& lobe, const Vec3& wo, const FittedRecord& fit, const Vec3& wi) {
   const double guided = mixturePdf(fit.mixture, toDisc(wi)) * wi.z() / fit.record.cosineMass / 2;
   const double p = 0.1 * lobe.pdf(wo, wi) + 0.9 * guided;
   return p > 0 ? lobe.eval(wo, wi) * wi.z() / fit.record.albedo / p : 0;
 }
 
-/// Another lobe's sampler, and no reflectance.
+/// The sampler of another lobe with zero reflectance.
 class BlackLobe : public Lobe {
  public:
   explicit BlackLobe(LobePtr lobe) : lobe_(std::move(lobe)) {}
@@ -47,7 +47,7 @@ class BlackLobe : public Lobe {
   LobePtr lobe_;
 };
 
-/// A cache of one record, written and opened; wo is where the only direction of the grid is.
+/// Writes and opens a cache with one record, for the only direction of its grid.
 LobeCache singleRecord(const fs::path& path, const Lobe& lobe, const Gaussian& g) {
   LobeCacheInfo info;
   info.model = lobe.model();
@@ -77,8 +77,8 @@ const char* const kScene = R"(<scene version="0.6.0">
   <shape type="sphere"><ref id="Aniso"/></shape>
 </scene>)";
 
-/// A folder with caches of kScene: good.lobe and poor.lobe of one lobe, more.lobe on a finer grid, other.lobe of the
-/// anisotropic lobe.
+/// A folder with caches of kScene: good.lobe and poor.lobe of the isotropic lobe, more.lobe the same on a finer grid,
+/// other.lobe of the anisotropic lobe.
 struct Caches : Folder {
   Caches() {
     writeAtomically(*this / "scene.xml", std::string(kScene));
@@ -102,13 +102,13 @@ struct Caches : Folder {
 
 }  // namespace
 
-TEST_CASE("fitter: worst f/p is the largest ratio over the disc, and is met where the grade says") {
+TEST_CASE("fitter: the worst f/p is the largest ratio over the disc at the reported direction") {
   for (const double elevation : {10.0, 60.0, 85.0}) {
     const LobePtr lobe = roughConductor(0.3, 0.3)->lobes().front();
     const auto theta = static_cast<float>(elevation * 3.14159265 / 180);
     const Vec3 wo(std::sin(theta), 0, std::cos(theta));
     FitSettings settings;
-    settings.components = 2;  // poor, so that there is something to find
+    settings.components = 2;  // a poor fit, so that the ratio is well above one
     const FittedRecord fit = fitLobe(*lobe, wo, settings);
     double largest = 0;
     for (int i = 0; i < 500; ++i) {
@@ -127,7 +127,7 @@ TEST_CASE("fitter: worst f/p is the largest ratio over the disc, and is met wher
   }
 }
 
-TEST_CASE("fitter: where nothing is reflected there is no worst f/p, and a picture all the same") {
+TEST_CASE("fitter: a lobe without reflectance has no worst f/p but can be plotted") {
   const Folder folder;
   const BlackLobe black(roughConductor(0.3, 0.3)->lobes().front());
   const Gaussian g{1, 0, 0, {0.04f, 0, 0.04f}};
@@ -138,7 +138,7 @@ TEST_CASE("fitter: where nothing is reflected there is no worst f/p, and a pictu
   CHECK(plotRecords(cache, std::vector{0}, &black).rows.size() == 1);
 }
 
-TEST_CASE("fitter: colours of plots are even in lightness") {
+TEST_CASE("fitter: colour maps of plots are monotonic in lightness") {
   for (int i = 0; i < 100; ++i) {
     CHECK(lightness(sequentialColour(0.01 * (i + 1))) > lightness(sequentialColour(0.01 * i)));
     CHECK(lightness(divergingColour(0.01 * i)) > lightness(divergingColour(0.01 * (i + 1))));
@@ -148,7 +148,7 @@ TEST_CASE("fitter: colours of plots are even in lightness") {
   CHECK((divergingColour(1)[0] > divergingColour(1)[2] && divergingColour(-1)[0] < divergingColour(-1)[2]));
 }
 
-TEST_CASE("fitter: a plot shows a fit that stands beside its target") {
+TEST_CASE("fitter: a plot shows that a fit misses its target") {
   const Folder folder;
   const LobePtr lobe = roughConductor(0.3, 0.3)->lobes().front();
   // The target peaks on the left, this fit is on the right.
@@ -173,13 +173,13 @@ TEST_CASE("fitter: a plot shows a fit that stands beside its target") {
   CHECK(plot.rows[0].grade->worst > 5);
 }
 
-TEST_CASE("fitter: records to show go from first to last") {
+TEST_CASE("fitter: the plotted records are spread from first to last") {
   CHECK(spreadRecords(64, 5) == std::vector{0, 15, 31, 47, 63});
   CHECK(spreadRecords(3, 5) == std::vector{0, 1, 2});
   CHECK(spreadRecords(1, 5) == std::vector{0});
 }
 
-TEST_CASE("fitter: lobedump --plot draws fits, and targets with the scene") {
+TEST_CASE("fitter: lobedump --plot draws fits and with --scene also targets") {
   const Caches folder;
   ToolRun r = folder.run("lobedump --plot fit.png good.lobe");
   CHECK(r.code == 0);
@@ -197,13 +197,13 @@ TEST_CASE("fitter: lobedump --plot draws fits, and targets with the scene") {
   CHECK(readFile(folder / "all.png") == readFile(folder / "again.png"));
 }
 
-TEST_CASE("fitter: lobedump --plot says what it cannot draw") {
+TEST_CASE("fitter: lobedump --plot reports invalid arguments") {
   const Caches folder;
   const ToolRun other = folder.run("lobedump --plot x.png --scene scene.xml -D alpha=0.25 good.lobe");
   CHECK(other.code == 1);
   CHECK_THAT(other.error, Catch::Contains("scene.xml: no material has the lobe of good.lobe"));
   const std::pair<const char*, const char*> cases[] = {{"lobedump --plot x.png good.lobe poor.lobe", "one cache file"},
-                                                       {"lobedump --plot x.jpg good.lobe", "written as .png"},
+                                                       {"lobedump --plot x.jpg good.lobe", "must be a .png file"},
                                                        {"lobedump --plot x.png good.lobe --record 8", "from 0 to 7"},
                                                        {"lobedump --plot x.png good.lobe --record -1", "--record"},
                                                        {"lobedump --plot x.png good.lobe --json", "excludes"},
@@ -217,10 +217,10 @@ TEST_CASE("fitter: lobedump --plot says what it cannot draw") {
     CHECK(lineCount(r.error) == 1);
   }
   CHECK(folder.run("lobedump --plot none/x.png good.lobe").code == 1);
-  CHECK(folder.files() == 5);  // nothing was written
+  CHECK(folder.files() == 5);  // no file was written
 }
 
-TEST_CASE("fitter: lobedump --diff ends as cmp does and says what differs") {
+TEST_CASE("fitter: lobedump --diff lists differences and returns exit codes like cmp") {
   const Caches folder;
   ToolRun r = folder.run("lobedump --diff good.lobe good.lobe");
   CHECK(r.code == 0);
@@ -245,7 +245,7 @@ TEST_CASE("fitter: lobedump --diff ends as cmp does and says what differs") {
   }
 }
 
-TEST_CASE("fitter: lobedump --diff --json counts and pairs records") {
+TEST_CASE("fitter: lobedump --diff --json counts and matches records") {
   const Caches folder;
   const auto diff = [&](const std::string& files) {
     return nlohmann::json::parse(folder.run("lobedump --diff --json " + files).out);
@@ -283,7 +283,7 @@ TEST_CASE("fitter: lobedump shows all quantities of a record") {
     CHECK_THAT(folder.run("lobedump good.lobe " + std::string(options)).out, Catch::Contains("worst f/p"));
 }
 
-TEST_CASE("fitter: a lobe that is left to the BSDF has no grade to show") {
+TEST_CASE("fitter: lobedump shows no grades for a lobe without components") {
   const Caches folder;
   LobeCacheInfo info;
   info.model = info.key = info.summary = info.toolVersion = "mirror";

@@ -1,4 +1,4 @@
-// loberender as its users see it: from a scene file to pictures, statistics and one-line errors.
+// Images, statistics and one-line errors of loberender.
 
 #include <filesystem>
 #include <set>
@@ -29,7 +29,7 @@ double number(const Imf::Header& header, const char* name) {
 
 }  // namespace
 
-TEST_CASE("loberender and lobefit: what the scene has and we replace is noted") {
+TEST_CASE("loberender and lobefit: replaced parts of a scene are noted") {
   const SceneFolder folder(false);
   std::string text = kScene;
   text.insert(text.find("<sensor"), "<integrator type=\"volpath\"/>");
@@ -38,11 +38,11 @@ TEST_CASE("loberender and lobefit: what the scene has and we replace is noted") 
     const ToolRun run =
         folder.run(tool == "lobefit" ? kQuickFit : "loberender scene.xml -o a.exr --integrator path --spp 1");
     CAPTURE(run.error);
-    CHECK(run.error.starts_with(tool + ": note: integrator \"volpath\" is replaced"));
+    CHECK(run.error.starts_with(tool + ": note: integrator \"volpath\" is ignored"));
   }
 }
 
-TEST_CASE("loberender: missing caches are named with the command that makes them") {
+TEST_CASE("loberender: the error for missing caches gives the command that creates them") {
   const SceneFolder folder(false);
   const std::string line = fault(folder, kRender, 1);
   CHECK_THAT(line, Catch::Contains("Steel, Iron") && Catch::Contains("Satin") && Catch::Contains(".lobe: missing"));
@@ -58,7 +58,7 @@ TEST_CASE("loberender: missing caches are named with the command that makes them
   CHECK(readImage(folder / "a.exr").width == 16);
 }
 
-TEST_CASE("loberender: the command that makes the caches is one that a shell takes") {
+TEST_CASE("loberender: the command that creates the caches is quoted for the shell") {
   const SceneFolder folder(false);
   std::string scene = kScene;
   scene.replace(scene.find("0.15"), 4, "$roughness");
@@ -73,7 +73,7 @@ TEST_CASE("loberender: the command that makes the caches is one that a shell tak
   CHECK(folder.run(render + kTraining).code == 0);
 }
 
-TEST_CASE("loberender: a cache of another version of the lobe is stale") {
+TEST_CASE("loberender: a cache of another revision of the lobe is stale") {
   const SceneFolder folder(true);
   const fs::path path = folder.caches().front();
   std::vector<std::byte> bytes;
@@ -92,7 +92,7 @@ TEST_CASE("loberender: a cache of another version of the lobe is stale") {
   CHECK(folder.run(kRender).code == 0);
 }
 
-TEST_CASE("loberender: damaged caches are refused in words") {
+TEST_CASE("loberender: errors explain why a cache is invalid") {
   const SceneFolder folder(true);
   const fs::path path = folder.caches().front();
   const std::string whole = readFile(path);
@@ -118,7 +118,7 @@ TEST_CASE("loberender: damaged caches are refused in words") {
   CHECK(folder.run(kRender).code == 0);
 }
 
-TEST_CASE("loberender: faults of the scene are named by file, line and column") {
+TEST_CASE("loberender: errors in a scene give file and line and column") {
   const SceneFolder folder(false);
   const auto lineOf = [&](const std::string& scene) {
     folder.write("bad.xml", "<scene version='0.6.0'><sensor type='perspective'/>\n" + scene + "\n</scene>");
@@ -133,7 +133,7 @@ TEST_CASE("loberender: faults of the scene are named by file, line and column") 
   CHECK_THAT(fault(folder, "loberender gone.xml -o a.exr --spp 1", 1), Catch::Contains("gone.xml"));
 }
 
-TEST_CASE("loberender: what makes no sense on the command line") {
+TEST_CASE("loberender: invalid command lines are errors") {
   const SceneFolder folder(false);
   const std::vector<std::pair<std::string, std::string>> cases{{"", "--spp"},
                                                                {" --spp 1 --seconds 1", "--spp"},
@@ -169,10 +169,10 @@ TEST_CASE("loberender: what makes no sense on the command line") {
   fault(folder, "loberender scene.xml --spp 1", 2);
 }
 
-TEST_CASE("loberender: files that cannot be written are refused before the work") {
+TEST_CASE("loberender: output files that cannot be written are reported before rendering") {
   const SceneFolder folder(false);
   folder.write("reference.exr", "not read yet");
-  // So many samples that a check after the work would never come.
+  // With this many samples a check after rendering would never be reached.
   const std::string render = "loberender scene.xml --integrator path --spp 1000000000";
   const auto refused = [&](const std::string& options) {
     CHECK_THAT(fault(folder, render + options, 1), Catch::Contains("cannot write"));
@@ -185,7 +185,7 @@ TEST_CASE("loberender: files that cannot be written are refused before the work"
   refused(" -o a.exr --reference reference.exr --convergence none/a.csv");
 }
 
-TEST_CASE("loberender: a reference has to be a picture of the same size") {
+TEST_CASE("loberender: a reference must be an image of the same size") {
   const SceneFolder folder(false);
   const std::string render = "loberender scene.xml --integrator path --spp 1";
   REQUIRE(folder.run(render + " --size 8x6 -o small.exr").code == 0);
@@ -195,7 +195,7 @@ TEST_CASE("loberender: a reference has to be a picture of the same size") {
   CHECK_THAT(fault(folder, measured + "gone.exr", 1), Catch::Contains("gone.exr"));
 }
 
-TEST_CASE("loberender: the same bytes for any number of threads, with what they came from") {
+TEST_CASE("loberender: images do not depend on the number of threads and store their provenance") {
   const SceneFolder folder(true);
   const std::string render = "loberender scene.xml --spp 4 --seed 9" + kTraining;
   REQUIRE(folder.run(render + " --threads 1 -o one.exr").code == 0);
@@ -217,7 +217,7 @@ TEST_CASE("loberender: the same bytes for any number of threads, with what they 
     CHECK_THAT(hashes, Catch::Contains(fmt::format("{:016x}", LobeCache::open(cache).hash())));
 }
 
-TEST_CASE("loberender: statistics, convergence and pictures of a run") {
+TEST_CASE("loberender: statistics and convergence and images of a run") {
   const SceneFolder folder(true);
   REQUIRE(folder.run("loberender scene.xml --integrator path --spp 8 --seed 2 -o reference.exr").code == 0);
   const std::set<std::string> before = folder.names();
@@ -275,7 +275,7 @@ TEST_CASE("loberender: statistics, convergence and pictures of a run") {
     CHECK(lines >= 2);
     CHECK(seconds > 0);
   }
-  SECTION("pictures") {
+  SECTION("images") {
     const Image exr = readImage(folder / "a.exr"), png = readImage(folder / "a.png");
     CHECK((png.width == 16 && png.height == 12));
     double difference = 0;
@@ -288,7 +288,7 @@ TEST_CASE("loberender: statistics, convergence and pictures of a run") {
   }
 }
 
-TEST_CASE("loberender: --record draws the record that a pixel shows") {
+TEST_CASE("loberender: --record plots the record used at a pixel") {
   const SceneFolder folder(false);
   const std::string guided = "loberender scene.xml -o a.exr --spp 1 --integrator guided" + kTraining;
   const ToolRun run = folder.run(guided + " --record 8,11 --record-image floor.png");
@@ -297,7 +297,7 @@ TEST_CASE("loberender: --record draws the record that a pixel shows") {
   CHECK_THAT(run.error, Catch::Contains("floor.png: position ") && Catch::Contains("NEV "));
   const Image image = readImage(folder / "floor.png");
   CHECK(image.width > 2 * image.height);
-  // Three panels with something in each.
+  // None of the three panels is empty.
   for (const int column : {0, 1, 2}) {
     std::set<float> greens;
     for (int y = 0; y < image.height; ++y)
@@ -308,25 +308,25 @@ TEST_CASE("loberender: --record draws the record that a pixel shows") {
   CHECK(folder.has("record.png"));
 }
 
-TEST_CASE("loberender: --record says why there is nothing to draw") {
+TEST_CASE("loberender: --record reports why no record can be plotted") {
   const SceneFolder folder(false);
   const std::string guided = "loberender scene.xml -o a.exr --spp 1 --integrator guided" + kTraining;
-  CHECK_THAT(fault(folder, guided + " --record 16,0", 1),
-             Catch::Contains("--record 16,0: the picture has 16x12 pixels"));
-  CHECK_THAT(fault(folder, guided + " --record=-1,3", 1), Catch::Contains("--record -1,3: the picture has"));
+  CHECK_THAT(fault(folder, guided + " --record 16,0", 1), Catch::Contains("--record 16,0: the image has 16x12 pixels"));
+  CHECK_THAT(fault(folder, guided + " --record=-1,3", 1), Catch::Contains("--record -1,3: the image has"));
   CHECK_THAT(fault(folder, guided + " --record 0,0", 1), Catch::Contains("no surface that scatters light"));
   CHECK_THAT(fault(folder, guided + " --record 3", 2), Catch::Contains("'3' is not X,Y"));
-  CHECK_THAT(fault(folder, guided + " --record 8,11 --record-image a.exr", 2), Catch::Contains("is written as .png"));
+  CHECK_THAT(fault(folder, guided + " --record 8,11 --record-image a.exr", 2),
+             Catch::Contains("must name a .png file"));
   CHECK_THAT(fault(folder, guided + " --record-image a.png", 2), Catch::Contains("--record"));
   CHECK_THAT(fault(folder, "loberender scene.xml -o a.exr --spp 1 --integrator path --record 8,11", 2),
-             Catch::Contains("path learns nothing"));
-  // In the light of nothing no record is made.
+             Catch::Contains("requires --integrator guided or product"));
+  // Without light there are no records.
   std::string dark = kScene;
   const std::string radiance = "radiance\" value=\"";
   dark[dark.find(radiance) + radiance.size()] = '0';
   folder.write("scene.xml", dark);
   const ToolRun run = folder.run(guided + " --record 8,11");
-  CHECK(run.code == 0);  // after hours of work the picture is what counts
+  CHECK(run.code == 0);  // a missing record must not discard a finished rendering
   CHECK_THAT(run.error, Catch::Contains("no record serves the point"));
   CHECK(folder.has("a.exr"));
 }

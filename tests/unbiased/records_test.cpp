@@ -1,4 +1,4 @@
-// What a renderer really samples: products of records and caches of a scene, against the density that they say.
+// Sampling of products of trained records and fitted caches of a real scene, tested against the reported density.
 
 #include <catch2/catch.hpp>
 
@@ -19,7 +19,7 @@ BrdfCaches cachesOf(const Studio& studio) {
   return {studio.lobes(), lobeRequests(studio.scene()), "lobefit"};
 }
 
-/// Reflectances of different lobes and directions, all with components, seen in the plane that a guide would turn.
+/// Reflectances of different lobes and directions that have components, rotated into a random tangent frame.
 std::vector<Reflectance> someReflectances(const Studio& studio) {
   const BrdfCaches caches = cachesOf(studio);
   const int lobes = static_cast<int>(lobeRequests(studio.scene()).size());
@@ -30,7 +30,7 @@ std::vector<Reflectance> someReflectances(const Studio& studio) {
     const Vec2 azimuth = Eigen::Rotation2Df(6.28f * rng.uniform()) * Vec2::UnitX(),
                turn = Eigen::Rotation2Df(6.28f * rng.uniform()) * Vec2::UnitX();
     Reflectance reflectance;
-    // Every other one has a diffuse part.
+    // Every second reflectance has a diffuse part.
     reflectance.constant = found.size() % 2 == 0 ? 0.1f : 0.0f;
     reflectance.backgroundMass = reflectance.constant;
     const int lobe = static_cast<int>(found.size()) * lobes / kReflectances;
@@ -61,10 +61,10 @@ TEST_CASE("unbiased: lobes are looked up at the nearest elevation") {
     }
   }
   CHECK(elevations >= 1000);
-  CHECK(others <= elevations / 1000);  // halfway between two
+  CHECK(others <= elevations / 1000);  // differences in rounding halfway between two elevations
 }
 
-TEST_CASE("unbiased: samples of trained records and fitted lobes have the density that is said", "[slow]") {
+TEST_CASE("unbiased: samples of trained records and fitted lobes follow the reported density", "[slow]") {
   const Studio studio(readScene(std::filesystem::path(LOBE_SOURCE_DIR) / "scenes/jewelry.xml"), 60, 40);
   const std::vector<Reflectance> reflectances = someReflectances(studio);
   const std::vector<IlluminationRecord> records = studio.illumination().records();

@@ -1,5 +1,5 @@
-// All integrators estimate the same picture: against each other pixel block by pixel block, and against what is known
-// in closed form. A sampler with a wrong density must be found out.
+// All integrators estimate the same image: they are compared with each other in blocks of pixels, and with known
+// results. A sampler with a wrong density must be detected.
 
 #include <catch2/catch.hpp>
 
@@ -22,7 +22,7 @@ using lobe::test::Studio;
 
 namespace {
 
-/// A product sampler that says a density a tenth too high.
+/// A product sampler that reports a density 10 % too high.
 struct WrongSampler {
   const GuidedSampler& right;
   class Vertex {
@@ -58,7 +58,7 @@ std::vector<Block> exactly(double value, std::size_t count) {
   return std::vector<Block>(count, Block{value, 0});
 }
 
-/// All integrators against path tracing, and one that is wrong.
+/// Checks that all integrators agree with path tracing, and that a wrong one does not.
 void checkAgreement(const Studio& studio) {
   REQUIRE(studio.illumination().records().size() > 10);
   const auto path = blocks(studio.render(studio.path(), 1024, 1), 5);
@@ -69,7 +69,7 @@ void checkAgreement(const Studio& studio) {
 
 }  // namespace
 
-TEST_CASE("unbiased: path, guided and product agree on the demo scene", "[slow]") {
+TEST_CASE("unbiased: all integrators agree on the demo scene", "[slow]") {
   const Studio studio(readScene(std::string(LOBE_SOURCE_DIR) + "/scenes/jewelry.xml"), 60, 40);
   REQUIRE(studio.illumination().records().size() > 100);
   const int samples = 192, size = 5;
@@ -80,7 +80,7 @@ TEST_CASE("unbiased: path, guided and product agree on the demo scene", "[slow]"
   CHECK_FALSE(agree(path, blocks(studio.render(WrongIntegrator(studio), samples, 4), size)));
 }
 
-TEST_CASE("unbiased: inside a glowing box radiance is emission over absorption", "[slow]") {
+TEST_CASE("unbiased: radiance in an emissive box is emission over absorption", "[slow]") {
   const lobe::test::Folder folder;
   std::ofstream(folder / "furnace.xml") << R"(<scene version="3.0.0">
     <sensor type="perspective"><float name="fov" value="70"/></sensor>
@@ -100,7 +100,7 @@ TEST_CASE("unbiased: inside a glowing box radiance is emission over absorption",
 
 namespace {
 
-/// An environment with a broad bright spot over a dim ground colour.
+/// An environment with a broad bright spot over a dim background.
 Image spotImage() {
   Image image(64, 32);
   for (int y = 0; y < 32; ++y)
@@ -111,7 +111,7 @@ Image spotImage() {
   return image;
 }
 
-/// ∫ ρ(wo, wi) L(wi) cosθ dω by a fine midpoint rule.
+/// ∫ ρ(wo, wi) L(wi) cosθ dω by the midpoint rule.
 double reflected(const Studio& studio, const Vec3& wo) {
   const Bsdf& bsdf = *studio.scene().materials[0].bsdf;
   const int steps = 1000;
@@ -128,9 +128,9 @@ double reflected(const Studio& studio, const Vec3& wo) {
 
 }  // namespace
 
-TEST_CASE("unbiased: a glossy plate under a bright spot reflects what the integral says", "[slow]") {
+TEST_CASE("unbiased: a glossy plate under a bright spot agrees with numerical integration", "[slow]") {
   const lobe::test::Folder folder;
-  // Seen from 50° through a narrow lens: wo hardly varies over the picture.
+  // Seen at 50° with a narrow field of view, so that wo is almost constant over the image.
   std::ofstream(folder / "plate.xml") << R"(<scene version="3.0.0">
     <sensor type="perspective"><float name="fov" value="0.5"/>
       <transform name="to_world"><lookat origin="-7.66044, 0, 6.42788" target="0, 0, 0" up="0, 0, 1"/></transform></sensor>
@@ -152,7 +152,7 @@ TEST_CASE("unbiased: a glossy plate under a bright spot reflects what the integr
   CHECK_FALSE(agree(wrong, exactly(expected, wrong.size())));
 }
 
-TEST_CASE("unbiased: path, guided and product agree through frosted glass on metal of varying roughness", "[slow]") {
+TEST_CASE("unbiased: all integrators agree through frosted glass on metal of varying roughness", "[slow]") {
   const lobe::test::Folder folder;
   std::ofstream(folder / "glass.xml") << R"(<scene version="3.0.0">
     <sensor type="perspective"><float name="fov" value="35"/>
@@ -170,7 +170,7 @@ TEST_CASE("unbiased: path, guided and product agree through frosted glass on met
   checkAgreement(studio);
 }
 
-TEST_CASE("unbiased: path, guided and product agree on coated, thin and mapped surfaces", "[slow]") {
+TEST_CASE("unbiased: all integrators agree on coated and thin and normal-mapped surfaces", "[slow]") {
   const lobe::test::Folder folder;
   std::ofstream(folder / "coated.xml") << R"(<scene version="3.0.0">
     <sensor type="perspective"><float name="fov" value="35"/>
@@ -194,7 +194,7 @@ TEST_CASE("unbiased: path, guided and product agree on coated, thin and mapped s
   checkAgreement(studio);
 }
 
-TEST_CASE("unbiased: training and rendering give the same bytes on any number of threads", "[slow]") {
+TEST_CASE("unbiased: training and rendering do not depend on the number of threads", "[slow]") {
   const auto renderWith = [](std::size_t threads) {
     const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism, threads);
     const Studio studio(readScene(std::string(LOBE_SOURCE_DIR) + "/scenes/jewelry.xml"), 24, 16);

@@ -1,6 +1,6 @@
 #pragma once
-// The compiled BRDF caches of a scene (files that lobefit or lobe::fitting write), opened once and shared by all
-// threads.
+// The compiled BRDF caches of a scene. The files are written by the tool lobefit or by compileLobe (lobe/fitting.h);
+// they are opened once and shared by all threads.
 
 #include <cstddef>
 #include <cstdint>
@@ -14,26 +14,28 @@ namespace lobe {
 
 class BrdfCaches;
 
-/// A lobe that a material has, and so a cache file that is needed.
+/// A lobe of one of the scene's materials, whose cache file is needed.
 struct LobeRequest {
-  std::string model, key;  ///< as the lobe was compiled; the file's name follows from them
-  int revision;            ///< of the model's code; a cache of another revision is stale
-  std::string material;    ///< for messages
+  std::string model, key;  ///< as in LobeFunctions; they determine the file name
+  int revision;            ///< revision of the model's code; a cache of another revision is stale
+  std::string material;    ///< name of the material, for error messages
 };
 
-/// Immutable once opened: const functions may be called from any thread. Copies share the files.
+/// The opened BRDF caches. Immutable: all functions may be called from any thread. Copies share the files and memory.
 class LobeCacheSet {
  public:
-  /// Opens the file of every request in the folder; equal keys share one. Throws std::runtime_error with one line that
-  /// names all materials whose cache is missing, stale or damaged, and `remedy`, the command that makes them. Mixtures
-  /// are merged up to `reduction` of Runnalls' cost (Herholz et al. 2016, Appendix B); 0 leaves them.
+  /// Opens the file of every request in the folder; requests with equal keys share one file. `reduction` ≥ 0: the
+  /// Gaussians of each record are merged until the sum of the merge costs would exceed it (Runnalls' cost, Herholz et
+  /// al. 2016, Appendix B); 0 merges none. Throws std::runtime_error with a one-line message that lists every missing,
+  /// stale or damaged file with its materials and ends with `remedy`, the command that creates the files.
   LobeCacheSet(const std::filesystem::path& folder, std::span<const LobeRequest> requests, const std::string& remedy,
                float reduction = 0);
 
+  /// Total size of the files in bytes.
   std::size_t bytes() const;
-  /// Mean number of Gaussians of a record; 0 without records.
+  /// Mean number of Gaussians per record; 0 if there are no records.
   double meanComponents() const;
-  /// Content hashes of the files, in the order of first use.
+  /// Content hashes of the files, in the order in which the requests first use them.
   std::vector<std::uint64_t> hashes() const;
 
  private:

@@ -1,6 +1,9 @@
 #pragma once
-// Trained illumination: records of incident radiance times cosine, as Gaussian mixtures on the hemisphere's disc (Vorba
-// et al. 2014, Section 5; Herholz et al. 2016), learnt from particles in passes.
+// The trained illumination of a scene: a spatial cache of records, each of which represents the distribution of
+// incident radiance times cosine, L cosθ, at a surface point by a Gaussian mixture over the unit disc (the equal-area
+// image of the hemisphere). Records are learnt from particles in passes (Vorba et al. 2014, "On-line Learning of
+// Parametric Mixture Models for Light Transport Simulation", Section 5; Herholz et al. 2016, "Product Importance
+// Sampling for Light Transport Path Guiding").
 
 #include <cstddef>
 #include <filesystem>
@@ -11,17 +14,19 @@
 
 namespace lobe {
 
+/// Options of training.
 struct FieldOptions {
   static constexpr int kMostComponents = 8;
 
-  float sceneDiagonal = 1;     ///< of the scene's bounding box, world units, > 0
-  int components = 8;          ///< Gaussians of a record, 1 to kMostComponents
-  int neighbours = 250;        ///< particles that a record is updated from in a pass, at most
-  float unitFraction = 0.02f;  ///< largest radius of a record, as a fraction of the diagonal, in (0, 1]
-  float klThreshold =
-      5.0f;  ///< standard deviations by which parallax may move a component within a record's radius, > 0
+  float sceneDiagonal = 1;     ///< diagonal of the scene's bounding box in world units, > 0
+  int components = 8;          ///< Gaussians per record, 1 to kMostComponents
+  int neighbours = 250;        ///< largest number of photons, and of camera-path samples, per record and pass, ≥ 1
+  float unitFraction = 0.02f;  ///< largest radius of a record, as a fraction of sceneDiagonal, in (0, 1]
+  /// Largest parallax within the radius of a record, in standard deviations of a component, > 0. Smaller values give
+  /// smaller radii and more records.
+  float klThreshold = 5.0f;
 
-  /// Throws std::runtime_error that names the field.
+  /// Throws std::runtime_error that names the first field that is out of range.
   void validate() const;
 };
 
@@ -29,50 +34,58 @@ class Field;
 class IlluminationCache;
 struct FieldData;
 
-// For the parts of the library and the tools that look inside; see runtime/guiding/field_data.h.
+// For internal use by the library and its tools; see runtime/guiding/field_data.h.
 const IlluminationCache& cacheOf(const Field& field);
 Field fieldOf(IlluminationCache cache);
 
-/// Copies share what has been learnt. update and fill must not run while other threads use the field; everything else
-/// is const and may be called from any thread.
+/// The trained illumination. Copies are cheap and share their content: an update of one changes all of them, while
+/// frozen() and reduced() make independent fields.
+///
+/// Threads: update and fill must not run while another thread uses the field or a copy of it. All other functions are
+/// const and may be called from any thread.
 class Field {
  public:
-  /// Without records, and not to be trained.
+  /// A field without records that cannot be trained.
   Field();
-  /// Nothing learnt yet. Throws std::runtime_error for options out of range.
+  /// A field without records, ready for training. Throws std::runtime_error for options out of range.
   explicit Field(const FieldOptions& options);
   ~Field();
   Field(const Field&);
   Field& operator=(const Field&);
 
-  /// What save wrote: for rendering, not for further training. Throws std::runtime_error that names the file when it is
-  /// missing, damaged or of a newer version.
+  /// Reads a file that save wrote. The field can be used for rendering, but not trained further. Throws
+  /// std::runtime_error that names the file if it is missing, damaged or of another major format version.
   static Field load(const std::filesystem::path& path);
-  /// Throws std::runtime_error that names the file. The file appears whole or not at all; the same field gives the same
-  /// bytes.
+  /// Writes the records to a file. Equal fields give equal bytes. The file is replaced atomically: if writing fails, an
+  /// existing file stays unchanged, and std::runtime_error that names the file is thrown.
   void save(const std::filesystem::path& path) const;
 
-  /// One training pass: updates every record from the particles around it, makes records where they were requested and
-  /// particles are, and learns the BSDF sampling fractions. Depends on the order of the paths in the storage, not on
-  /// threads. Returns the mean over the records of the log-likelihood of the pass's particles before they were learnt
-  /// from (nats); nullopt: no record has met a particle. Throws std::logic_error for a field that was loaded.
+  /// Performs one training pass: learns the BSDF sampling fractions, updates every record from the particles near it,
+  /// and creates the requested records where there are particles. The result depends on the indices of the paths
+  /// (SampleStorage::beginPath), not on threads. Samples of the BSDF sampling fraction must have been recorded with
+  /// this field or a copy of it.
+  ///
+  /// Returns the log-likelihood of the particles near a record under its mixture before the update, in nats, averaged
+  /// over the records: a measure on data that was not trained on. nullopt if no record had particles near it. Throws
+  /// std::logic_error if the field cannot be trained (it was default-constructed, loaded, frozen or reduced).
   std::optional<double> update(const SampleStorage& storage);
 
-  /// Makes the records that one storage requests, from the particles of another; updates none. For the end of training,
-  /// when radii have shrunk since the last requests. Throws as update.
+  /// Creates the records that `requests` asks for, from the particles of `particles`; existing records are not changed.
+  /// Intended for the end of training, because the radii of records shrink in updates and leave gaps. Throws
+  /// std::logic_error as update does.
   void fill(const SampleStorage& requests, const SampleStorage& particles);
 
-  /// The same without what training needs, for rendering.
+  /// An independent copy of the records for rendering, without the training data.
   Field frozen() const;
 
-  /// As frozen, with mixtures merged up to this cost (Runnalls; Herholz et al. 2016, Appendix
-  /// B), ≥ 0. Records of four components or fewer take half the memory.
+  /// As frozen, but the Gaussians of each record are merged until the sum of the merge costs would exceed `cost` ≥ 0
+  /// (Runnalls' cost, Herholz et al. 2016, Appendix B). A record of up to four components takes about half the memory.
   Field reduced(float cost) const;
 
-  std::size_t records() const;
-  std::size_t bytes() const;
-  double meanComponents() const;        ///< of a record; 0 without records
-  double undersampledFraction() const;  ///< of the records: those that have seen fewer than five particles a component
+  std::size_t records() const;          ///< number of records
+  std::size_t bytes() const;            ///< memory of the records and their look-up structure
+  double meanComponents() const;        ///< mean number of Gaussians per record; 0 if there are no records
+  double undersampledFraction() const;  ///< fraction of records with < 5 particles per Gaussian; 0 if not trainable
 
  private:
   friend class SurfaceDistribution;

@@ -1,6 +1,7 @@
 #pragma once
-// Compiles a host's own reflectance lobes into the cache files that LobeCacheSet opens. In the target lobe::fitting,
-// which needs Ceres; a renderer that uses caches made earlier links lobe::guiding alone.
+// Fits the reflectance lobes of a host renderer and writes the cache files that LobeCacheSet opens. This header belongs
+// to the target lobe::fitting, which requires Ceres. A renderer that only uses existing caches needs lobe::guiding
+// alone.
 
 #include <cstddef>
 #include <filesystem>
@@ -12,58 +13,62 @@
 
 namespace lobe {
 
-/// A direction drawn by a lobe's sampler.
+/// A direction drawn by the sampler of a lobe.
 struct LobeDirection {
-  Float3 wi;
-  float pdf;  ///< over solid angle, > 0
+  Float3 wi;  ///< unit, in the frame of LobeFunctions
+  float pdf;  ///< density over solid angle, > 0 and finite
 };
 
-/// A colourless reflection lobe, given by three functions. Directions are unit, point away from the surface and are
-/// local to a frame whose z axis is the normal; both have z > 0. The functions are called from several threads at a
-/// time.
+/// A scalar (colourless) reflection lobe of a BSDF, described by three functions. Frame: directions are unit vectors
+/// that point away from the surface, in a local frame whose z axis is the normal; wo and wi have z > 0. Threads: the
+/// functions are called concurrently.
 struct LobeFunctions {
-  /// Short name of the model, part of the file's name: letters, digits, '-' and '_'.
+  /// Short name of the model, used in the file name: letters, digits, '-' and '_'.
   std::string model;
-  /// Everything that evaluate depends on, as text: lobes with equal keys share a cache.
+  /// All parameters that evaluate depends on, as text. Lobes with equal keys share a cache file.
   std::string key;
-  /// To be raised when the code of the model changes; a cache of another revision is stale.
+  /// Increase it whenever the code of the model changes its values; a cache of another revision is stale.
   int revision = 1;
   /// Whether the value changes when wo and wi are rotated together about the normal.
   bool anisotropic = false;
-  /// Whether the value stays the same when both directions are mirrored in the x axis, and in the y axis. Of
-  /// anisotropic lobes that do, a quarter of the directions is fitted.
+  /// Whether the value is unchanged when wo and wi are both reflected in the x axis, and likewise in the y axis. Only a
+  /// quarter of the directions of an anisotropic lobe needs to be fitted then.
   bool mirrorSymmetric = false;
 
-  /// The BRDF's value without the cosine, ≥ 0 and finite.
+  /// The value of the BRDF in 1/sr, without the cosine; ≥ 0 and finite.
   std::function<double(const Float3& wo, const Float3& wi)> evaluate;
-  /// Draws wi from u uniform in [0,1)²; nullopt for a sample of value zero, which counts as a sample.
+  /// Maps u, uniform in [0,1)², to a direction wi. nullopt is a sample of value zero; it counts as a sample.
   std::function<std::optional<LobeDirection>(const Float3& wo, const Float2& u)> sample;
-  /// The density of sample over solid angle; 0 where it never draws.
+  /// The density of `sample` over solid angle; 0 for directions that it never draws.
   std::function<float(const Float3& wo, const Float3& wi)> pdf;
 };
 
 struct FittingOptions {
-  std::filesystem::path folder = "lobes";  ///< of the cache files, made when missing
-  /// The relative variance of one sample of the product with uniform light that is good enough for a record.
+  std::filesystem::path folder = "lobes";  ///< folder of the cache files; created if it does not exist
+  /// Target relative variance (NEV) of a record, > 0: the variance, divided by the squared mean, of one sample that
+  /// estimates the reflection of uniform light, ∫ ρ cosθ dω. The sample has a density of 10 % lobe sampling and 90 %
+  /// fitted mixture times cosθ (Herholz et al. 2016, Appendix C).
   float quality = 0.03f;
-  int components = 8;  ///< most Gaussians of a record, 1 to 32
-  bool force = false;  ///< fit again what is up to date
+  int components = 8;  ///< largest number of Gaussians per record, 1 to 32
+  bool force = false;  ///< fit again even if the cache file is up to date
 
-  /// Throws std::runtime_error that names the field.
+  /// Throws std::runtime_error that names the first field that is out of range.
   void validate() const;
 };
 
+/// The result of compileLobe.
 struct CompiledLobe {
-  std::filesystem::path file;
-  bool fitted;                  ///< false: the file was up to date
-  std::size_t records;          ///< mixtures in the file, each for one direction wo
-  float worstRelativeVariance;  ///< of a record, as FittingOptions::quality
+  std::filesystem::path file;   ///< the cache file
+  bool fitted;                  ///< false if the file was already up to date
+  std::size_t records;          ///< number of mixtures in the file, each for one direction wo
+  float worstRelativeVariance;  ///< largest relative variance of all records, as defined by FittingOptions::quality
 };
 
-/// Fits the lobe on all cores (as TBB limits them) and writes its cache file, which appears whole or not at all. The
-/// bytes do not depend on the number of threads. Throws std::runtime_error that names the lobe or the file when a
-/// function returns what it must not, when nothing is reflected from any direction's sampler, or when the file cannot
-/// be written.
+/// Fits the lobe in parallel (TBB) and writes its cache file atomically; does nothing if the file is up to date. The
+/// bytes of the file do not depend on the number of threads. The records of a lobe that reflects nothing or is too
+/// narrow for Gaussians have no components; guiding then leaves the lobe to BSDF sampling. Throws std::runtime_error
+/// that names the lobe, field or file if a field or option is invalid, if a function returns a value out of range, or
+/// if the file cannot be written.
 CompiledLobe compileLobe(const LobeFunctions& lobe, const FittingOptions& options = {});
 
 }  // namespace lobe

@@ -1,5 +1,5 @@
 #pragma once
-// What a host's camera paths tell a field: told vertex by vertex while a path is traced.
+// Records camera paths of the host renderer, vertex by vertex, as training samples for a Field.
 
 #include <array>
 #include <cstddef>
@@ -11,44 +11,49 @@
 
 namespace lobe {
 
-/// What is recorded where a path goes on from a surface. Colours are linear RGB with Rec. 709 primaries.
+/// A vertex from which a path continues in a sampled direction. Colours are linear RGB with Rec. 709 primaries.
 struct RecordedVertex {
-  Float3 position, normal;  ///< world space; unit geometric normal, of either side
-  Float3 direction;         ///< unit, world space: the direction sampled
-  Float3 wi;                ///< the same, local as the distribution knows it
-  float pdf;                ///< > 0, the density that it was drawn with, over solid angle
-  float bsdfPdf = 0;        ///< the BSDF's own density of it; needed where the distribution says learnsFraction()
-  Float3 weight;            ///< f |cosθ| / pdf
-  Float3 throughput;        ///< of the path behind this vertex, weight included, before Russian roulette
+  Float3 position, normal;  ///< world space; normal: unit geometric normal, facing either side
+  Float3 direction;         ///< the sampled direction: unit, world space, away from the surface
+  Float3 wi;                ///< the same direction in the shading frame of the ShadingPoint
+  float pdf;                ///< density over solid angle with which it was sampled, > 0
+  float bsdfPdf = 0;        ///< density of the BSDF's own sampler, over solid angle; used only if learnsFraction()
+  Float3 weight;            ///< BSDF value times |cosθ| / pdf
+  Float3 throughput;        ///< path throughput, including `weight`, before Russian roulette at this vertex
 };
 
 struct PathRecorderOptions {
-  bool particles = true;  ///< record what illumination records learn from
-  bool fractions = true;  ///< record what BSDF sampling fractions are learnt from
+  bool particles = true;  ///< record samples of incident radiance, from which illumination records are learnt
+  bool fractions = true;  ///< record samples for the BSDF sampling fraction
 };
 
-/// Turns one path at a time into samples of incident light: what arrived at each vertex from the direction sampled
-/// there is the light that the path collects behind it. One a thread.
+/// Converts camera paths, one at a time, into samples of incident radiance: the radiance arriving at a vertex from the
+/// sampled direction is estimated by the light that the rest of the path collects. Not thread-safe: use one recorder
+/// and one storage per thread.
 class PathRecorder {
  public:
-  /// The storage outlives it.
+  /// Writes to `storage`, which must outlive the recorder.
   explicit PathRecorder(SampleStorage& storage, const PathRecorderOptions& options = {})
       : storage_(&storage), options_(options) {}
 
-  /// Begins a path; what the storage is told from here on belongs to it.
+  /// Begins a path and calls SampleStorage::beginPath(pathIndex) of the storage.
   void begin(std::uint64_t pathIndex);
 
-  /// The path goes on from a surface. distribution: that the direction was drawn from, or nullptr. Vertices beyond
-  /// kMaxVertices are not recorded. Delta scattering is not to be recorded.
+  /// Adds a vertex. `distribution` is the distribution that the direction was drawn from, or nullptr if the BSDF's
+  /// sampler was used without one; it is not kept. Vertices beyond kMaxVertices are ignored. Do not add vertices with
+  /// delta scattering.
   void addVertex(const RecordedVertex& vertex, const SurfaceDistribution* distribution);
 
-  /// The distance to where the last vertex's direction led; +infinity (the default) when nothing is hit.
+  /// Sets the distance, in world units, from the last vertex to the next surface in the sampled direction; +infinity
+  /// (the default) if the ray hits nothing.
   void setDistance(float distance);
 
-  /// Light that the path found, as it contributes to the pixel: throughput and multiple importance weights included.
+  /// Adds light that the path collects, as a contribution to the pixel: radiance times throughput and multiple
+  /// importance weight. It is credited to all vertices added so far. Light collected by next-event estimation at a
+  /// surface is therefore added before addVertex of that surface.
   void addLight(const Float3& contribution);
 
-  /// Ends the path: its samples go to the storage.
+  /// Ends the path and writes its samples to the storage. Samples that are not positive and finite are omitted.
   void end();
 
   static constexpr int kMaxVertices = 32;
@@ -62,7 +67,7 @@ class PathRecorder {
     Float3 position, normal, direction;
     float cosineOverPdf, distance;
     Float3 throughput;
-    float radiance;  // that arrived from the direction, luminance
+    float radiance;  // incident radiance (luminance) from the direction, summed over addLight
     std::optional<Fraction> fraction;
   };
   SampleStorage* storage_;

@@ -1,5 +1,5 @@
 #pragma once
-// What paths tell about light, collected by threads and learnt from by a Field.
+// The training samples of one pass: collected per thread, merged, and passed to Field::update.
 
 #include <cstddef>
 #include <cstdint>
@@ -11,9 +11,9 @@ namespace lobe {
 
 struct SampleStorageData;
 
-/// Particles, requests for records and samples of the BSDF sampling fraction. One for each thread; not safe to share
-/// while it is written. Samples carry the index of the path that they belong to, and merging orders them by it, so that
-/// what a field learns does not depend on which thread traced which path.
+/// Holds particles, requests for records and samples for the BSDF sampling fraction. Not thread-safe: use one storage
+/// per thread and merge them. Field::update sorts the samples by the index of their path, so that the result does not
+/// depend on which thread traced which path.
 class SampleStorage {
  public:
   SampleStorage();
@@ -21,22 +21,31 @@ class SampleStorage {
   SampleStorage(SampleStorage&&) noexcept;
   SampleStorage& operator=(SampleStorage&&) noexcept;
 
-  /// What follows belongs to this path. Each path is begun once, in one storage.
+  /// Begins a path; all samples added afterwards belong to it. Must be called before the first sample is added. Indices
+  /// must be unique among all storages that are merged.
   void beginPath(std::uint64_t index);
 
-  /// Light that a photon brought to a surface. normal: unit geometric normal on the side that it arrived at; direction:
-  /// unit, from the surface to where it came from; weight: its flux that next-event estimation would not find better, ≥
-  /// 0; distance: travelled since the last vertex, +infinity from the environment; flux: all of its flux.
+  /// Adds a photon that arrived at a surface, in world space.
+  ///
+  /// normal: unit geometric normal on the side where the photon arrived.
+  /// direction: unit, from the surface to where the photon came from.
+  /// weight: flux (luminance), ≥ 0, without the part that next-event estimation handles better.
+  /// distance: world units travelled since the last vertex; +infinity for light from the environment.
+  /// flux: total flux (luminance), ≥ 0, before subtracting the part handled by next-event estimation. The irradiance of
+  /// records is estimated from it; all passes must use the same unit.
   void addPhoton(const Float3& position, const Float3& normal, const Float3& direction, float weight, float distance,
                  float flux);
 
-  /// Asks for a record at a point where there is none, see SurfaceDistribution::hasRecord.
+  /// Requests a record at a point that no record serves (see SurfaceDistribution::hasRecord). World space; normal: unit
+  /// geometric normal on the side of the path.
   void requestRecord(const Float3& position, const Float3& normal);
 
-  /// Takes over the paths of another storage, which is left empty.
+  /// Appends the content of another storage and leaves that one empty.
   void merge(SampleStorage&& other);
 
+  /// Number of particles, from photons and camera paths.
   std::size_t particles() const;
+  /// Removes all content.
   void clear();
 
  private:

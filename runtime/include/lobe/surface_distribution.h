@@ -1,18 +1,19 @@
 #pragma once
-// The distribution of directions at one surface point: a one-sample mixture of BSDF sampling, the illumination mixture
-// and the product of illumination and reflectance (Herholz et al. 2016; the third strategy and the background component
-// are ours). Its density over solid angle is
+// The sampling distribution of directions at one surface point: a one-sample mixture of BSDF sampling, the illumination
+// mixture, and the product of illumination and reflectance (Herholz et al. 2016; sampling the illumination as a third
+// strategy and the background component are additions of Lobe). Its density over solid angle is
 //
-//   p(wi) = bsdfProbability() · p_bsdf(wi) + guidedPdf(wi),
+//   p(wi) = bsdfProbability() · p_bsdf(wi) + guidedPdf(wi).
 //
-// so that a host needs its own BSDF's sampler and pdf, this class, and a choice between the two:
+// The host renderer combines the sampler and pdf of its BSDF with this class as follows:
 //
 //   float choice = uniform();
 //   const Strategy strategy = distribution.choose(choice);
 //   wi = strategy == Strategy::bsdf ? bsdf.sample(choice, u) : distribution.sample(strategy, choice, u)->wi;
 //   pdf = distribution.bsdfProbability() * bsdf.pdf(wi) + distribution.guidedPdf(wi);
 //
-// Estimates with this density are unbiased whatever the field has learnt, because the BSDF keeps a part everywhere.
+// Estimates with this density are unbiased whatever the field has learnt, because the probability of BSDF sampling is
+// always positive.
 
 #include <cstddef>
 #include <cstdint>
@@ -25,46 +26,47 @@
 
 namespace lobe {
 
-/// Where directions are to be sampled, in world space but for wo.
+/// A surface point at which a direction is sampled. All vectors are in world space except wo.
 struct ShadingPoint {
   Float3 position;
-  Float3 normal;   ///< unit geometric normal, of the side that the shading normal is on
-  Float3 s, t, n;  ///< the shading frame: orthonormal, n is the shading normal
-  Float3 wo;       ///< unit, local in that frame; z < 0 on the back
+  Float3 normal;   ///< unit geometric normal on the side of the shading normal n
+  Float3 s, t, n;  ///< the shading frame: orthonormal; x, y and z axis of local directions; n is the shading normal
+  Float3 wo;       ///< unit, in the shading frame, away from the surface; z < 0 if it leaves on the side of −n
 };
 
-/// A compiled lobe and how much of it the material has at this point: luminance of its colour or texture.
+/// A compiled lobe of the material and its scale at this point.
 struct TintedLobe {
-  int lobe;  ///< index into the requests that the cache set was opened with
-  float tint;
+  int lobe;    ///< index into the requests that the cache set was opened with
+  float tint;  ///< luminance of the colour or texture that multiplies the lobe, ≥ 0
 };
 
-/// The smooth (not delta) part of the BSDF at this point and wo, as far as mixtures describe it.
+/// The non-delta reflection of the BSDF at this point for wo, as far as mixtures represent it.
 struct SurfaceReflectance {
   std::span<const TintedLobe> lobes;
-  float diffuseAlbedo = 0;        ///< of constant reflection, luminance
-  float undescribedFraction = 0;  ///< fraction in [0,1] of the albedo that neither describes: transmission, other lobes
+  float diffuseAlbedo = 0;  ///< albedo (luminance) of the part with constant BRDF value, albedo / π
+  /// Fraction in [0,1] of the non-delta albedo that is in neither of the above: transmission and lobes without a cache.
+  float undescribedFraction = 0;
 };
 
-/// What was made of a point.
+/// How directions are sampled at a point, and why.
 enum class GuidingDecision : std::uint8_t {
-  product,       ///< illumination times reflectance
-  illumination,  ///< the illumination mixture, because reflectance is constant or no caches were given
-  undersampled,  ///< illumination and BSDF half and half: the record has seen few particles
-  tooNarrow,     ///< BSDF only: its lobes are too narrow for mixtures, or nothing is described
-  uniform,       ///< BSDF only: the illumination is uniform
-  noRecord       ///< BSDF only: nothing was learnt here
+  product,       ///< product, illumination and BSDF
+  illumination,  ///< illumination and BSDF: the reflectance is constant, or no caches were given
+  undersampled,  ///< illumination and BSDF with probability ½ each: the record has seen too few particles
+  tooNarrow,     ///< BSDF only: the lobes are too narrow for mixtures, or no part of the BSDF was described
+  uniform,       ///< BSDF only: the incident radiance is nearly constant
+  noRecord       ///< BSDF only: no record serves the point
 };
 
-/// The fraction of directions that the product leaves to the BSDF before records have learnt another.
+/// The BSDF sampling fraction of a record for product sampling before training has learnt a better one.
 inline constexpr float kInitialBsdfFraction = 0.20f;
 
-/// What found a direction.
+/// The sampling strategies of the one-sample mixture.
 enum class Strategy : std::uint8_t { bsdf, product, illumination };
 
 namespace detail {
 
-/// Splits [0,1) at a probability and maps the part that choice falls in to [0,1).
+/// Whether choice, uniform in [0,1), is less than the probability. Rescales choice to be uniform in [0,1) again.
 inline bool takePart(float& choice, float probability) {
   constexpr float kOneMinusEpsilon = 0x1.fffffep-1f;
   const bool first = choice < probability;
@@ -80,48 +82,54 @@ inline Strategy chooseStrategy(float& choice, float bsdfProbability, float produ
 
 }  // namespace detail
 
-/// A direction that was not drawn by the BSDF.
+/// A direction drawn from the illumination or the product.
 struct GuidedSample {
-  Float3 wi;        ///< unit, local
+  Float3 wi;        ///< unit, in the shading frame
   float guidedPdf;  ///< SurfaceDistribution::guidedPdf(wi)
 };
 
-/// Some kilobytes without memory on the heap: keep it on the stack. It copies what it needs of the field, so that later
-/// updates of the field do not affect it; the cache set outlives it. One thread at a time.
+/// The distribution at one point. An object takes about 4 kB and allocates no memory; it is meant to live on the stack.
+/// It copies the record that it uses, so that later updates of the field, or its destruction, do not affect it. Not
+/// thread-safe while describe runs; the const functions may be called from any thread.
 class SurfaceDistribution {
  public:
-  /// Looks up the record that serves the point. Without one all directions are the BSDF's.
+  /// Looks up the record that serves the point. Without one, all directions are left to BSDF sampling.
   SurfaceDistribution(const Field& field, const ShadingPoint& point);
   SurfaceDistribution(const SurfaceDistribution&) = delete;
   SurfaceDistribution& operator=(const SurfaceDistribution&) = delete;
 
+  /// Whether a record serves the point.
   bool hasRecord() const { return hasRecord_; }
 
-  /// To be called once if hasRecord(). caches: as opened for the lobes' indices; nullptr: no product is made (Vorba et
-  /// al. 2014).
+  /// Sets the reflectance and prepares sampling. Must be called exactly once if hasRecord(), and not otherwise.
+  /// `caches` is the cache set that the lobes' indices refer to; nullptr disables the product, so that directions are
+  /// sampled from illumination and BSDF with probability ½ each (Vorba et al. 2014). Neither argument is kept.
   void describe(const SurfaceReflectance& reflectance, const LobeCacheSet* caches);
 
   GuidingDecision decision() const { return decision_; }
 
-  /// The probability with which the BSDF's own sampler is to be used; positive, 1 without a record.
+  /// The probability of using the BSDF's own sampler (the BSDF sampling fraction), in (0,1]; 1 without a record.
   float bsdfProbability() const { return bsdfProbability_; }
 
-  /// Chooses with `choice` uniform in [0,1), which is made uniform again for what is chosen.
+  /// Chooses a strategy with `choice` uniform in [0,1), and rescales `choice` to be uniform in [0,1) again.
   Strategy choose(float& choice) const { return detail::chooseStrategy(choice, bsdfProbability_, productOfGuided_); }
 
-  /// A direction by a strategy other than the BSDF; choice and u uniform in [0,1) and [0,1)². nullopt: a sample
-  /// of value zero.
+  /// Samples a direction with a strategy that choose returned, other than Strategy::bsdf. choice: uniform in [0,1), as
+  /// rescaled by choose; u: uniform in [0,1)². nullopt is a sample of value zero; it must be counted as a sample.
   std::optional<GuidedSample> sample(Strategy strategy, float choice, const Float2& u) const;
 
-  /// The part of the density that is not the BSDF's, over solid angle. wi: unit, local.
+  /// The density over solid angle of choosing the illumination or the product and sampling wi with it. wi: unit, in the
+  /// shading frame. 0 for directions on the other side of the surface than wo.
   float guidedPdf(const Float3& wi) const;
 
-  /// The radiance (luminance, up to a factor that is the same at all points of a field) that leaves towards wo by
-  /// reflection, for Russian roulette and splitting. albedo: luminance of the whole BSDF's, used without caches.
-  /// nullopt: not known.
+  /// Estimates the reflected radiance towards wo (luminance, up to a factor that is the same for all points of a
+  /// field), for adjoint-driven Russian roulette and splitting (Vorba and Křivánek 2016). albedo: luminance of the
+  /// albedo of the whole BSDF, used if describe was called without caches. nullopt if no estimate is available: without
+  /// a record, if undescribedFraction > 0, or if training used no photons, from which the irradiance is estimated.
   std::optional<float> reflectedRadiance(float albedo) const;
 
-  /// Whether directions sampled here tell a PathRecorder of the BSDF sampling fraction.
+  /// Whether a direction sampled here is a training sample for the BSDF sampling fraction. If so,
+  /// PathRecorder::addVertex needs RecordedVertex::bsdfPdf.
   bool learnsFraction() const;
 
  private:
@@ -134,7 +142,7 @@ class SurfaceDistribution {
   bool hasRecord_ = false;
   GuidingDecision decision_ = GuidingDecision::noRecord;
   float bsdfProbability_ = 1;
-  float productOfGuided_ = 0;  // the probability of Strategy::product where it is not the BSDF's
+  float productOfGuided_ = 0;  // the probability of Strategy::product given that the strategy is not bsdf
   alignas(kAlignment) std::byte storage_[kBytes];
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-// The vector types of the public headers.
+// The vector types of the public headers: plain structs, so that hosts need no linear-algebra library.
 
 namespace lobe {
 

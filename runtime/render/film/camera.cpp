@@ -23,7 +23,7 @@ double sinc(double x) {
   return std::abs(x) > 1e-6 ? std::sin(kPi * x) / (kPi * x) : 1;
 }
 
-/// As Mitsuba has them.
+/// Filters as defined in Mitsuba.
 double valueOf(const PixelFilter& filter, double x) {
   if (filter.kind == PixelFilter::Kind::mitchell) return mitchell(2 * x / filter.radius, filter.b, filter.c);
   if (filter.kind == PixelFilter::Kind::lanczos) return sinc(x) * sinc(x / filter.radius);
@@ -47,14 +47,14 @@ void check(const Camera& camera) {
   const FilmCrop crop = camera.picture();
   if (crop.x < 0 || crop.y < 0 || crop.width < 1 || crop.height < 1 || crop.x + crop.width > camera.width ||
       crop.y + crop.height > camera.height)
-    throw std::runtime_error(fmt::format("camera: a crop of {}x{} pixels at {},{} is not on a film of {}x{}",
+    throw std::runtime_error(fmt::format("camera: a crop of {}x{} pixels at {},{} exceeds the film of {}x{} pixels",
                                          crop.width, crop.height, crop.x, crop.y, camera.width, camera.height));
   if (!(camera.apertureRadius >= 0.0f && camera.focusDistance > 0.0f))
-    throw std::runtime_error(
-        fmt::format("camera: a lens of radius {} cannot focus at {}", camera.apertureRadius, camera.focusDistance));
+    throw std::runtime_error(fmt::format("camera: a lens of radius {} cannot focus at distance {}",
+                                         camera.apertureRadius, camera.focusDistance));
   if (!(camera.horizontalFov > 0.0f && camera.horizontalFov < 180.0f))
     throw std::runtime_error(
-        fmt::format("camera: the field of view is {} degrees, not between 0 and 180", camera.horizontalFov));
+        fmt::format("camera: the field of view of {} degrees is not between 0 and 180", camera.horizontalFov));
   const float determinant = camera.toWorld.topLeftCorner<3, 3>().determinant();
   if (!camera.toWorld.allFinite() || determinant == 0.0f)
     throw std::runtime_error("camera: the to_world matrix cannot be inverted");
@@ -68,7 +68,7 @@ FilterSampler::FilterSampler(const PixelFilter& filter) : filter_(filter) {
   if (filter.kind == PixelFilter::Kind::gaussian && !(filter.stddev > 0.0f))
     throw std::runtime_error("reconstruction filter: the standard deviation is not positive");
   intervals_ = positivePart(filter);
-  if (!(intervals_.total() > 0)) throw std::runtime_error("reconstruction filter: it is nowhere positive");
+  if (!(intervals_.total() > 0)) throw std::runtime_error("reconstruction filter: it has no positive values");
 }
 
 float FilterSampler::sample(float u) const {
@@ -92,7 +92,7 @@ RayCamera::RayCamera(const Camera& camera, const PixelFilter& filter)
   const bool orthographic = kind_ == Camera::Kind::orthographic;
   const Eigen::Matrix3f toWorld = camera.toWorld.topLeftCorner<3, 3>();
   axis_ = toWorld.col(2).normalized();
-  // The film at distance 1; without perspective, from −1 to 1.
+  // The film plane is at distance 1; an orthographic film extends from −1 to 1.
   const float half = orthographic ? 1.0f : std::tan(0.5f * camera.horizontalFov * kPi / 180.0f);
   const float pixel = 2.0f * half / camera.width;
   // +x is left: columns run towards −x, rows towards −y.

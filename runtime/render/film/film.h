@@ -1,6 +1,6 @@
 #pragma once
-// Sums of samples per pixel. Different pixels may be written by different threads; each pixel's samples have to come in
-// the same order for the same bytes.
+// Accumulates the samples of each pixel. Threads may write different pixels concurrently; results are reproducible bit
+// by bit if the samples of each pixel are added in the same order.
 
 #include <cstdint>
 #include <vector>
@@ -16,16 +16,16 @@ class Film {
   int width() const { return width_; }
   int height() const { return height_; }
 
-  /// A sample with a component that is negative or not finite is dropped and counted, never averaged.
+  /// Samples with a negative or non-finite component are dropped and counted.
   void add(int x, int y, const Rgb& sample);
 
-  /// Black where a pixel has no sample.
+  /// The mean of the samples of each pixel; black for pixels without samples.
   Image mean() const;
 
-  /// The variance of each pixel's mean, unbiased; infinite where a pixel has fewer than two samples.
+  /// The unbiased variance of each pixel's mean; infinite for pixels with fewer than two samples.
   Image varianceOfMean() const;
 
-  /// Samples that add dropped.
+  /// The number of samples that add dropped.
   std::uint64_t dropped() const;
 
  private:

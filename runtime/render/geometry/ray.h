@@ -8,11 +8,11 @@ namespace lobe {
 
 inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-/// A half-line, or the part of it up to tfar. It starts at its origin: origins that lie on a surface are moved off it
-/// beforehand (offsetPoint, spawnRay in surface_hit.h).
+/// A ray from its origin up to the distance tfar. There is no near bound: origins on a surface must be offset
+/// beforehand (offsetPoint and spawnRay in surface_hit.h).
 struct Ray {
   Vec3 origin;
-  Vec3 direction;  ///< unit, unless tfar says that it is a segment (occlusion tests)
+  Vec3 direction;  ///< unit length, except for the segments of occlusion tests
   float tfar = kInfinity;
 };
 

@@ -17,7 +17,7 @@ namespace {
 template <class T>
 constexpr bool kIsAnalytic = !std::is_same_v<T, TriangleMesh> && !std::is_same_v<T, Instance>;
 
-/// Box of a shape of the scene, of which the groups it may show have theirs.
+/// Bounding box of a shape of the scene; groups: bounding boxes of the shape groups that instances refer to.
 Eigen::AlignedBox3f boundsOf(const Geometry& geometry, const std::vector<Eigen::AlignedBox3f>& groups) {
   return std::visit(
       [&](const auto& g) {
@@ -31,13 +31,13 @@ Eigen::AlignedBox3f boundsOf(const Geometry& geometry, const std::vector<Eigen::
 
 void reportBounds(const RTCBoundsFunctionArguments* args) {
   Eigen::AlignedBox3f box = boundsOf(static_cast<const Shape*>(args->geometryUserPtr)->geometry, {});
-  // The box was rounded; it has to contain the shape.
+  // The box was rounded, but must contain the shape.
   const Vec3 margin = (box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs())) * 0x1p-21f;
   box = {box.min() - margin, box.max() + margin};
   *args->bounds_o = {box.min().x(), box.min().y(), box.min().z(), 0, box.max().x(), box.max().y(), box.max().z(), 0};
 }
 
-// Only single rays are traced, so a callback's one ray has the layout of RTCRay.
+// Only single rays are traced, so the ray of a callback has the layout of RTCRay.
 std::optional<double> intersectUser(const Shape& shape, const RTCRay& ray) {
   const Eigen::Vector3d origin(ray.org_x, ray.org_y, ray.org_z);
   const Eigen::Vector3d direction(ray.dir_x, ray.dir_y, ray.dir_z);
@@ -83,7 +83,7 @@ RTCRay embreeRay(const Ray& ray) {
 }
 
 void fillMesh(RTCGeometry geometry, const TriangleMesh& mesh) {
-  // Embree's own buffers have the padding that its loads need.
+  // Buffers that Embree allocates have the padding that its vector loads need.
   void* positions = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3),
                                             mesh.positions.size());
   void* triangles = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
@@ -107,8 +107,8 @@ void fillInstance(RTCGeometry geometry, const Instance& instance, RTCScene group
   rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT4X4_COLUMN_MAJOR, instance.toWorld.matrix().data());
 }
 
-/// The largest coordinate of the places that rays start from: surfaces, the camera, lights, and for photons from far
-/// away a sphere about the scene.
+/// The largest absolute coordinate of ray origins: surfaces, the camera, lights, and a sphere around the scene on which
+/// photons from lights at infinity start.
 double reachOfRays(const Scene& scene, const Eigen::AlignedBox3f& bounds) {
   Eigen::AlignedBox3f box = bounds;
   box.extend(Vec3(scene.camera.toWorld.topRightCorner<3, 1>()));
@@ -122,8 +122,8 @@ double reachOfRays(const Scene& scene, const Eigen::AlignedBox3f& bounds) {
   return kSphere * box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff();
 }
 
-/// Whether rays keep origins and directions that Embree takes when they are transformed into the instance's group.
-/// reach: the largest coordinate of their origins.
+/// Whether rays that are transformed into the instance's group have origins and directions within Embree's limits.
+/// reach: the largest absolute coordinate of ray origins.
 bool isTraceable(const Instance& instance, double reach) {
   constexpr double kEmbreeLimit = 1e18;
   const Eigen::Matrix3d inverse = instance.toWorld.linear().cast<double>().inverse();
@@ -146,7 +146,7 @@ struct RayTracer::Embree {
   double buildSeconds = 0;
 
   explicit Embree(const Scene& source) {
-    if (!device) throw std::runtime_error("Embree: no device");
+    if (!device) throw std::runtime_error("Embree: the device cannot be created");
     rtcSetDeviceErrorFunction(
         device,
         [](void* text, RTCError, const char* message) { *static_cast<std::string*>(text) = message ? message : "?"; },
@@ -176,7 +176,8 @@ struct RayTracer::Embree {
 
   RTCScene build(const std::vector<Shape>& shapes) {
     RTCScene result = rtcNewScene(device);
-    // Robust: rays do not slip through shared edges. High quality: built once, traced hundreds of millions of times.
+    // Robust, so that rays do not pass through shared edges. High quality, because the scene is built once and traced
+    // hundreds of millions of times.
     rtcSetSceneFlags(result, RTC_SCENE_FLAG_ROBUST);
     rtcSetSceneBuildQuality(result, RTC_BUILD_QUALITY_HIGH);
     for (std::size_t i = 0; i < shapes.size(); ++i) {
@@ -191,7 +192,8 @@ struct RayTracer::Embree {
     return result;
   }
 
-  /// What cannot be traced is left out where it is beyond the precision of coordinates.
+  /// Whether the shape is an untraceable instance smaller than the precision of coordinates, which is left out. Throws
+  /// std::runtime_error for larger untraceable instances.
   bool isTooSmall(const Shape& shape, const Eigen::AlignedBox3f& shapeBox) const {
     const auto* instance = std::get_if<Instance>(&shape.geometry);
     if (!instance || isTraceable(*instance, reach)) return false;
@@ -213,7 +215,7 @@ struct RayTracer::Embree {
     rtcReleaseGeometry(geometry);
   }
 
-  double reach = 0;  // the largest coordinate of a ray's origin
+  double reach = 0;  // the largest absolute coordinate of ray origins
   std::string error;
 };
 

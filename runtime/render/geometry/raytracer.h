@@ -1,5 +1,5 @@
 #pragma once
-// Ray tracing with Embree. Both sides of every surface are hit.
+// Ray tracing with Embree. Rays hit both sides of every surface.
 
 #include <memory>
 #include <optional>
@@ -14,23 +14,23 @@ namespace lobe {
 
 class RayTracer {
  public:
-  /// Copies the geometry it needs; the scene outlives it all the same (for surface). Builds with all threads that
-  /// oneTBB may use. Throws std::runtime_error with Embree's message.
+  /// Builds the acceleration structures with all threads that oneTBB may use. The scene must outlive the tracer. Throws
+  /// std::runtime_error with Embree's message.
   explicit RayTracer(const Scene& scene);
 
-  /// The nearest hit in (0, tfar].
+  /// The nearest hit at a distance in (0, tfar].
   std::optional<Hit> intersect(const Ray& ray) const;
 
-  /// intersect, with everything about the point.
+  /// Like intersect, but returns the full surface interaction.
   std::optional<SurfaceHit> trace(const Ray& ray) const;
 
-  /// Whether anything is hit in (0, tfar); distances in units of the direction's length.
+  /// Whether there is a hit in (0, tfar); distances are in units of the direction's length.
   bool occluded(const Ray& ray) const;
 
-  /// What Embree took for its acceleration structures.
+  /// The time in seconds in which Embree built its acceleration structures.
   double buildSeconds() const;
 
-  /// Of all shapes; empty without shapes.
+  /// The bounding box of all shapes; empty without shapes.
   const Eigen::AlignedBox3f& bounds() const;
 
  private:

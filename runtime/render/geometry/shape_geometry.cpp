@@ -11,7 +11,7 @@ namespace {
 
 using Vec3d = Eigen::Vector3d;
 
-// Half the box about an ellipse of which u and v are conjugate radii: the largest |cosφ u + sinφ v| along each axis.
+// Half the bounding box of an ellipse with conjugate radii u and v: the largest |cosφ u + sinφ v| along each axis.
 Vec3 extentOfEllipse(const Vec3& u, const Vec3& v) {
   return (u.cast<double>().array().square() + v.cast<double>().array().square()).sqrt().cast<float>();
 }
@@ -20,7 +20,7 @@ Vec3 extentOfEllipse(const Vec3& u, const Vec3& v) {
 
 std::optional<double> intersectShape(const Sphere& sphere, const Vec3d& origin, const Vec3d& direction,
                                      const Interval& range) {
-  // The discriminant from the distance between centre and line does not cancel (Haines et al. 2019).
+  // Computing the discriminant from the distance between centre and line avoids cancellation (Haines et al. 2019).
   const double a = direction.squaredNorm();
   const Vec3d f = origin - sphere.centre.cast<double>();
   const double b = -f.dot(direction);
@@ -44,9 +44,9 @@ std::optional<double> intersectShape(const Disk& disk, const Vec3d& origin, cons
   const Vec3d normal = u.cross(v);
   const Vec3d centre = disk.centre.cast<double>();
   const double t = (centre - origin).dot(normal) / direction.dot(normal);
-  if (!range.contains(t)) return std::nullopt;  // also where the ray runs along the plane (t is no number)
+  if (!range.contains(t)) return std::nullopt;  // also if the ray is parallel to the plane and t is NaN
   const Eigen::Vector2d p = diskCoordinates(disk, origin + t * direction);
-  if (p.squaredNorm() > 1.0) return std::nullopt;
+  if (!(p.squaredNorm() <= 1.0)) return std::nullopt;  // also if the ray is parallel to the plane and t is infinite
   return t;
 }
 
@@ -59,7 +59,7 @@ Eigen::Vector2d diskCoordinates(const Disk& disk, const Vec3d& point) {
 
 std::optional<double> intersectShape(const Cylinder& cylinder, const Vec3d& origin, const Vec3d& direction,
                                      const Interval& range) {
-  // In units of the radius across the axis, and of its length along it.
+  // Coordinates in units of the radius across the axis, and of the length along it.
   Eigen::Matrix3d axes;
   axes << cylinder.u.cast<double>(), cylinder.v.cast<double>(), cylinder.axis.cast<double>();
   const Vec3d squares = axes.colwise().squaredNorm();

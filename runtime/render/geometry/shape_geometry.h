@@ -1,6 +1,6 @@
 #pragma once
-// Shapes that are not meshes: where rays meet them, what space they take, how large they are. World space or that of a
-// group, as the shape is given.
+// Intersections, bounds and areas of shapes, in the space in which the shape is given: world space or that of a group.
+// Meshes are intersected by Embree.
 
 #include <optional>
 
@@ -8,14 +8,14 @@
 
 namespace lobe {
 
-/// An open line segment: distances in units of the direction's length, in (near, far].
+/// A half-open interval (near, far] of distances along a line, in units of the direction's length.
 struct Interval {
   double near, far;
   bool contains(double t) const { return t > near && t <= far; }
 };
 
-/// The nearest distance in range at which the line meets the shape from either side. In double precision: the error is
-/// then that of the ray itself, at any scale.
+/// The nearest distance in range at which the line hits the shape from either side; nullopt without a hit. Computed in
+/// double precision, so that the error is that of the ray itself at any scale.
 std::optional<double> intersectShape(const Sphere& sphere, const Eigen::Vector3d& origin,
                                      const Eigen::Vector3d& direction, const Interval& range);
 std::optional<double> intersectShape(const Disk& disk, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
@@ -28,7 +28,7 @@ Eigen::AlignedBox3f boundsOf(const Sphere& sphere);
 Eigen::AlignedBox3f boundsOf(const Disk& disk);
 Eigen::AlignedBox3f boundsOf(const Cylinder& cylinder);
 
-/// The point as x u + y v from the centre, in the plane of the disk, which it may be off.
+/// Coordinates (x, y) of a point that is projected onto the plane of the disk: centre + x u + y v.
 Eigen::Vector2d diskCoordinates(const Disk& disk, const Eigen::Vector3d& point);
 
 float areaOf(const Sphere& sphere);

@@ -9,9 +9,10 @@
 namespace lobe {
 namespace {
 
-// In units of the largest coordinate. Intersections err by a few 2^-24 of it; this leaves room for grazing rays.
+// Relative to the largest coordinate. Intersections have errors of a few 2^-24 of it; the rest is a margin for grazing
+// rays.
 constexpr float kOffset = 0x1p-18f;
-// A plane that contains a coordinate plane has no error along its normal, but an offset of zero would be no offset.
+// On a coordinate plane, positions have no error along the normal, but the offset must not be zero.
 constexpr float kLeastOffset = 0x1p-24f;
 
 // extent: the largest absolute coordinates of the primitive. Only errors along the normal matter.
@@ -107,7 +108,7 @@ Resolved resolve(const Cylinder& cylinder, const Ray& ray, const Hit& hit) {
   return {point, point.normal, cylinderDerivatives(cylinder, azimuth)};
 }
 
-/// Out of the space of a group. The offset grows with the errors of both spaces.
+/// Transforms from the space of a group to world space. The offset covers the errors of both spaces.
 Resolved transformed(const Resolved& r, const Eigen::Affine3f& toWorld) {
   const Eigen::Matrix3f linear = toWorld.linear();
   const Eigen::Matrix3f forNormals = linear.inverse().transpose();
@@ -125,14 +126,14 @@ Resolved resolve(const Shape& shape, const Ray& ray, const Hit& hit) {
   return std::visit(
       [&](const auto& geometry) -> Resolved {
         if constexpr (std::is_same_v<std::decay_t<decltype(geometry)>, Instance>)
-          throw std::logic_error("an instance of an instance");
+          throw std::logic_error("nested instances are not supported");
         else
           return resolve(geometry, ray, hit);
       },
       shape.geometry);
 }
 
-/// A distance along a ray is the same in both spaces, as its direction is not made unit again.
+/// Distances along a ray are the same in both spaces, because the transformed direction is not normalised.
 Resolved resolveInstanced(const Instance& instance, const Shape& shape, const Ray& ray, const Hit& hit) {
   const Eigen::Affine3f toGroup = instance.toWorld.inverse();
   const Ray inGroup{toGroup * ray.origin, toGroup.linear() * ray.direction};
@@ -143,8 +144,8 @@ Vec3 facing(const Vec3& normal, const Vec3& side) {
   return normal.dot(side) < 0.0f ? Vec3(-normal) : normal;
 }
 
-/// Fills in the frame and what follows from how it is mapped; hit.bsdf and hit.woWorld are there already. unit: of the
-/// lengths that a BSDF knows, such as the height of bumps, in those of the scene.
+/// Sets the shading frame and the values that follow from bump mapping; hit.bsdf and hit.woWorld must be set. unit: the
+/// unit of lengths in BSDFs, such as the height of bumps, in scene units.
 void setFrame(const Resolved& r, float unit, SurfaceHit& hit) {
   const Frame frame = Frame::fromTangent(facing(r.shadingNormal, r.point.normal), r.derivatives.dpdu);
   hit.frame = frame;
@@ -160,7 +161,7 @@ void setFrame(const Resolved& r, float unit, SurfaceHit& hit) {
   if (hit.bsdf->shadowsTerminator()) hit.terminatorRoughness2 = terminatorRoughness2(hit.unmapped.z());
 }
 
-/// Smith's term of GGX facets on the unmapped surface.
+/// Smith's shadowing term of GGX microfacets on the surface without bump mapping.
 float terminatorShadowing(const SurfaceHit& hit, const Vec3& wi) {
   if (hit.terminatorRoughness2 <= 0.0f) return 1.0f;
   const float cosine = hit.unmapped.dot(wi);

@@ -73,7 +73,7 @@ float GuidedSampler::Vertex::pdf(const Vec3& wi) const {
 }
 
 std::optional<float> GuidedSampler::Vertex::reflectedRadiance() const {
-  // Nothing is known of light that comes through the surface.
+  // Transmitted light is not estimated.
   if (!distribution_.hasRecord() || hit_.bsdf->transmits()) return std::nullopt;
   const float albedo = sampler_.caches_ ? 0.0f : luminance(hit_.bsdf->albedo(hit_.wo, hit_.uv));
   return distribution_.reflectedRadiance(albedo);

@@ -1,6 +1,6 @@
 #pragma once
-// Path tracing that samples directions by what was learnt: the illumination mixture and the BSDF half and half
-// (`guided`, Vorba et al. 2014), or with their product besides (`product`, Herholz et al. 2016).
+// Guided path tracing: directions are sampled from the learnt illumination mixture and the BSDF, half each (`guided`,
+// Vorba et al. 2014), or also from their product (`product`, Herholz et al. 2016).
 
 #include <optional>
 
@@ -9,14 +9,14 @@
 
 namespace lobe {
 
-/// One request for each lobe of each material, material by material.
+/// One request for each lobe of each material, in the order of the materials.
 std::vector<LobeRequest> lobeRequests(const Scene& scene);
 
-/// What the path loop needs of a sampler, by a SurfaceDistribution at each vertex.
+/// The sampler of the path loop (path_loop.h) that uses a SurfaceDistribution at each vertex.
 class GuidedSampler {
  public:
-  /// The field and the caches outlive it. caches: opened for lobeRequests(scene); nullptr: illumination and BSDF only
-  /// (`guided`).
+  /// The field and the caches must outlive it. caches: opened for lobeRequests(scene); nullptr: illumination and BSDF
+  /// only (`guided`).
   GuidedSampler(const Scene& scene, const Field& field, const LobeCacheSet* caches);
 
   class Vertex {
@@ -44,7 +44,7 @@ class GuidedSampler {
 
 class GuidedIntegrator : public Integrator {
  public:
-  /// Scene and sampler outlive it.
+  /// Scene and sampler must outlive it.
   GuidedIntegrator(const RenderScene& scene, const PathOptions& options, const GuidedSampler& sampler)
       : scene_(scene), options_(options), sampler_(sampler) {}
   Rgb radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const override;

@@ -1,5 +1,5 @@
 #pragma once
-// What all integrators share: the interface, and what they count.
+// The interface of all integrators, and path statistics.
 
 #include <array>
 #include <cstdint>
@@ -10,14 +10,14 @@
 
 namespace lobe {
 
-/// What found the next direction of a path: in the order of Strategy, then delta scattering.
+/// Techniques that sample the next direction of a path, in the order of Strategy, then delta scattering.
 inline constexpr std::array<const char*, 4> kScatteringNames{"bsdf", "product", "illumination", "delta"};
 
 /// In the order of GuidingDecision.
 inline constexpr std::array<const char*, 6> kGuidingDecisionNames{"product",    "illumination", "undersampled",
                                                                   "too_narrow", "uniform",      "no_record"};
 
-/// Counted by each thread for itself and summed; sums of integers do not depend on the order.
+/// Counted separately by each task and summed; integer sums do not depend on the order.
 struct PathStatistics {
   std::uint64_t paths = 0;
   std::uint64_t segments = 0;    ///< rays traced to extend paths
@@ -43,7 +43,7 @@ struct PathStatistics {
 class Integrator {
  public:
   virtual ~Integrator() = default;
-  /// One unbiased estimate of the radiance that arrives along the ray. Called from many threads.
+  /// An unbiased estimate of the radiance that arrives along the ray. Called concurrently from many threads.
   virtual Rgb radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const = 0;
 };
 

@@ -1,11 +1,11 @@
 #pragma once
-// Path tracing with BSDF and emitter sampling.
+// Path tracing with BSDF sampling and next-event estimation.
 
 #include "runtime/render/integrators/path_loop.h"
 
 namespace lobe {
 
-/// Samples directions as the material itself does.
+/// The sampler of the path loop (path_loop.h) that samples the BSDF.
 struct BsdfSampler {
   class Vertex {
    public:
@@ -26,7 +26,7 @@ struct BsdfSampler {
 
 class PathIntegrator : public Integrator {
  public:
-  /// The scene outlives it.
+  /// The scene must outlive it.
   PathIntegrator(const RenderScene& scene, const PathOptions& options) : scene_(scene), options_(options) {}
   Rgb radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const override;
 

@@ -1,25 +1,27 @@
 #pragma once
-// The path tracer's loop, for any way of sampling directions: emission, emitter sampling with multiple importance
-// sampling (power heuristic), the delta part of materials, path russianRoulette. Only the smooth part's directions are
-// the sampler's.
+// The path tracing loop for any sampler of directions: emission, next-event estimation with multiple importance
+// sampling (power heuristic), delta components of materials, Russian roulette and splitting. The sampler only samples
+// the non-delta component.
 //
-// A sampler is a type with a nested Vertex, made where a path scatters at a smooth surface and gone before the next:
+// A sampler is a type with a nested class Vertex, which the loop constructs where a path scatters at a surface that is
+// not purely specular:
 //
 //   struct Sampler {
 //     class Vertex {
 //       Vertex(const Sampler& sampler, const SurfaceHit& hit);
-//       // One direction with its BSDF value and its density pdf(wi); nullopt: a sample of value zero. Counts the
-//       // strategy it chose.
+//       // Samples a direction, with its BSDF value and its density pdf(wi); nullopt: a sample of value zero.
+//       // Counts the strategy that was chosen.
 //       std::optional<BsdfSample> sample(Rng& rng, PathStatistics& statistics) const;
 //       // The density of sample over solid angle.
 //       float pdf(const Vec3& wi) const;
-//       // The radiance, luminance, that leaves towards wo by reflection, in units that all vertices share; nullopt:
-//       // not known.
+//       // Estimate of the radiance reflected towards wo, luminance, in units that all vertices share; nullopt:
+//       // unknown.
 //       std::optional<float> reflectedRadiance() const;
 //     };
 //   };
 //
-// Directions are local in hit.frame, whose z is on the geometric front side: hit.wo may have z < 0. hit.bsdf exists.
+// Directions are local in hit.frame, whose z axis is on the geometric front side, so hit.wo may have z < 0. hit.bsdf is
+// not null.
 
 #include <algorithm>
 #include <cmath>
@@ -33,13 +35,13 @@ namespace lobe {
 
 /// Russian roulette by the path's throughput, or adjoint-driven: Russian roulette and splitting keep each path's
 /// expected contribution near the estimate at its first vertex (Vorba and Křivánek 2016, "Adjoint-Driven Russian
-/// Roulette and Splitting", who compare with an estimate of the pixel; that of the first vertex has the units and the
-/// errors of those that follow). Vertices without an estimate use the throughput.
+/// Roulette and Splitting"). The paper compares with an estimate of the pixel instead; the estimate at the first vertex
+/// has the same units and errors as those at later vertices. Vertices without an estimate use the throughput.
 enum class RussianRoulette { throughput, adjoint };
 
 struct PathOptions {
   int maxDepth = std::numeric_limits<int>::max();  ///< segments: 1 shows emitters only, 2 adds direct light
-  int rouletteDepth = 5;                           ///< segments before paths may end by chance
+  int rouletteDepth = 5;                           ///< segments before Russian roulette applies
   RussianRoulette russianRoulette = RussianRoulette::adjoint;
   EmitterVisibility emitterVisibility = EmitterVisibility::shown;
 };
@@ -47,15 +49,16 @@ struct PathOptions {
 /// Upper bound of the survival probability once Russian roulette applies, so that every path ends.
 inline constexpr float kMaxSurvival = 0.95f;
 
-/// Bounds of the weight window, for the expected contribution over the reference: their ratio is 5 and their mean 1
-/// (ibid., Eq. 6).
+/// Bounds of the weight window, for the ratio of expected contribution and reference: their ratio is 5 and their mean 1
+/// (Vorba and Křivánek 2016, Eq. 6).
 inline constexpr float kWeightWindowLow = 1.0f / 3.0f, kWeightWindowHigh = 5.0f / 3.0f;
-/// Lower bound of the survival probability: an estimate may be too low by any factor, and survivors are divided by it.
+/// Lower bound of the survival probability: estimates may be far too low, and the throughput of survivors is divided by
+/// it.
 inline constexpr float kLeastSurvival = 0.2f;
 /// Upper bound of the branches that splitting makes of one camera path.
 inline constexpr int kMaxBranches = 16;
 
-/// The multiple importance weight of a technique with density `own` where another has `other` (power heuristic).
+/// The multiple importance weight of a technique with density `own` against one with density `other` (power heuristic).
 inline float misWeight(float own, float other) {
   const float ratio = other / own;
   return 1.0f / (1.0f + ratio * ratio);
@@ -81,13 +84,13 @@ class PathLoop {
     PathStatistics& statistics;
     Rgb radiance = Rgb::Zero();
     Rgb throughput = Rgb::Ones();
-    float pdf = 0;  // of the last direction; 0 after the camera or a delta part: emitter sampling could not find it
-    Rgb expected = Rgb::Ones();  // product of the albedos met: what scattering leaves on average, whatever was sampled
-    float eta2 = 1;  // how much refraction has compressed radiance so far, which russianRoulette has to undo
+    float pdf = 0;  // of the last direction; 0 after the camera or a delta component, where NEE does not apply
+    Rgb expected = Rgb::Ones();  // product of the albedos: the expected throughput, whatever was sampled
+    float eta2 = 1;              // scaling of radiance by refraction so far, which Russian roulette undoes
     Vec3 previous = Vec3::Zero();
     int depth = 0;
-    float reference = 0;  // expected contribution of the first vertex that says; 0: none yet
-    int branches = 1;     // that the camera's path has become on the way here
+    float reference = 0;  // expected contribution at the first vertex with an estimate; 0: none yet
+    int branches = 1;     // into which the camera path has been split so far
   };
 
   void follow(Path& path) const {
@@ -95,7 +98,7 @@ class PathLoop {
       if (!advance(path)) break;
   }
 
-  // One segment and what happens at its end; false: the path is over.
+  // Traces one segment and processes its end point; returns false when the path ends.
   bool advance(Path& path) const {
     ++path.statistics.segments;
     const bool dark = path.depth == 1 && options_.emitterVisibility != EmitterVisibility::shown;
@@ -111,7 +114,7 @@ class PathLoop {
     return scatter(path, *hit);
   }
 
-  // What the camera sees where emitters do not shine on it.
+  // The first surface that a camera path meets if the camera does not see emitters as such.
   std::optional<SurfaceHit> firstVisible(Path& path) const {
     for (;;) {
       std::optional<SurfaceHit> hit = scene_.tracer.trace(path.ray);
@@ -129,10 +132,11 @@ class PathLoop {
     path.radiance += path.throughput * emitted * weight;
   }
 
-  // By what the path carries; divides it by the probability.
-  bool survivesPlain(Path& path) const {
+  // Russian roulette by throughput; divides the throughput by the survival probability.
+  bool survivesByThroughput(Path& path) const {
     if (path.depth < options_.rouletteDepth) return true;
-    // A guided direction has a small throughput because much light is expected there: it must not die of that.
+    // A guided direction has a small throughput because much light is expected from it; the path must not be terminated
+    // for that reason.
     const float carried = std::max(path.throughput.maxCoeff() * path.eta2, path.expected.maxCoeff());
     return survives(path, std::min(carried, kMaxSurvival));
   }
@@ -143,15 +147,15 @@ class PathLoop {
     return true;
   }
 
-  // How many times the path goes on from the vertex: 0 when it ends here.
+  // Number of branches that continue from the vertex; 0 if the path ends here.
   int continuations(Path& path, const typename Sampler::Vertex& vertex) const {
     const std::optional<float> leaving =
         options_.russianRoulette == RussianRoulette::adjoint ? vertex.reflectedRadiance() : std::nullopt;
     const float expected = leaving ? luminance(path.throughput) * *leaving : 0.0f;
-    if (!leaving || !std::isfinite(expected)) return survivesPlain(path) ? 1 : 0;
+    if (!leaving || !std::isfinite(expected)) return survivesByThroughput(path) ? 1 : 0;
     if (path.reference <= 0) path.reference = expected;
     const float ratio = path.reference > 0 ? expected / path.reference : 1.0f;
-    // So that every path ends.
+    // Below 1 in long paths, so that every path ends.
     const float most = path.depth >= options_.rouletteDepth ? kMaxSurvival : 1.0f;
     if (!(ratio >= kWeightWindowLow))
       return survives(path, std::clamp(ratio / kWeightWindowLow, kLeastSurvival, most)) ? 1 : 0;
@@ -162,7 +166,7 @@ class PathLoop {
 
   bool scatter(Path& path, const SurfaceHit& hit) const {
     const float deltaFraction = hit.bsdf->deltaProbability(hit.wo, hit.uv);
-    if (deltaFraction >= 1.0f) return survivesPlain(path) && scatterDelta(path, hit, deltaFraction);
+    if (deltaFraction >= 1.0f) return survivesByThroughput(path) && scatterDelta(path, hit, deltaFraction);
     const typename Sampler::Vertex vertex(sampler_, hit);
     const int copies = continuations(path, vertex);
     if (copies == 0) return false;

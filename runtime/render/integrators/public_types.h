@@ -1,5 +1,5 @@
 #pragma once
-// From our vectors and colours to those of the guiding library's public headers.
+// Conversions from vectors and colours to the types of the guiding library's public headers.
 
 #include "lobe/types.h"
 #include "runtime/core/vec.h"

@@ -69,8 +69,9 @@ class WaveRenderer {
   int columns_, tiles_;
 };
 
-// How many samples the next wave takes; 0: no more. Waves double, so that early ones come soon and late ones cost
-// little to report, up to a share of the budget that keeps a wrong guess of their cost small.
+// The number of samples of the next wave; 0 ends rendering. Waves double in size, so that results appear early and the
+// overhead of later waves is small, up to a fraction of the budget that limits the effect of an inaccurate cost
+// estimate.
 class WavePlan {
  public:
   explicit WavePlan(const RenderOptions& options) : options_(options) {}
@@ -89,7 +90,7 @@ class WavePlan {
 
   double left(const RenderProgress& progress, double cost) const {
     if (options_.samples) return *options_.samples - progress.samples;
-    // A sample that fits for the most part is taken: on average the budget is met.
+    // A sample that mostly fits is still rendered, so that the budget is met on average.
     return (*options_.seconds - progress.seconds) / cost + std::min(0.5, 0.01 * *options_.seconds / cost);
   }
 
@@ -100,7 +101,7 @@ class WavePlan {
 
 void RenderOptions::validate() const {
   if (samples.has_value() == seconds.has_value())
-    throw std::runtime_error("either a number of samples or a time has to be given, not both");
+    throw std::runtime_error("exactly one of samples and seconds must be given");
   if (samples && *samples < 1) throw std::runtime_error(fmt::format("samples per pixel: {} is not positive", *samples));
   if (firstSample < 0) throw std::runtime_error(fmt::format("first sample: {} is negative", firstSample));
   if (seconds && !(*seconds > 0.0)) throw std::runtime_error(fmt::format("seconds: {} is not positive", *seconds));

@@ -15,19 +15,19 @@ namespace lobe {
 struct RenderOptions {
   std::uint64_t seed = 1;
   std::optional<int> samples;     ///< per pixel: the same image for a seed, on any number of threads
-  std::optional<double> seconds;  ///< stops when another wave would not fit; at least one sample per pixel
-  int firstSample = 0;            ///< of the samples of every pixel; with it the number of samples fits an int
+  std::optional<double> seconds;  ///< stops when another wave would not fit; renders at least one sample per pixel
+  int firstSample = 0;            ///< index of the first sample of every pixel; firstSample + samples must fit an int
 
   /// Throws std::runtime_error that names the field.
   void validate() const;
 };
 
 struct RenderProgress {
-  double seconds;  ///< spent rendering so far, without the time spent in callbacks
+  double seconds;  ///< rendering time so far, without the time spent in callbacks
   int samples;     ///< per pixel so far
 };
 
-/// Called after each wave, from the calling thread, with the film at rest.
+/// Called after each wave, from the calling thread, while no thread writes to the film.
 using AfterWave = std::function<void(const RenderProgress&)>;
 
 struct RenderResult {
@@ -35,8 +35,8 @@ struct RenderResult {
   RenderProgress total;
 };
 
-/// Adds samples to the film, which has the camera's size and is empty. Sample s of pixel i, counted from firstSample,
-/// draws from the random stream (seed, i, s).
+/// Adds samples to the film, which must be empty and have the size of the camera's image. Sample s of pixel i, counted
+/// from firstSample, uses the random stream (seed, i, s).
 RenderResult render(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options,
                     const AfterWave& afterWave = {});
 

@@ -5,9 +5,9 @@
 namespace lobe {
 namespace {
 
-/// The share of its intensity that a spot light sends at this angle from its axis (cosine).
+/// The falloff of a spot light in a direction, a factor of its intensity.
 float falloff(const SpotLight& spot, const Vec3& direction) {
-  // By the chord: accurate on the axis, where the cosine has lost the angle.
+  // Computed from the chord, because the cosine of a small angle is inaccurate.
   const float angle = 2.0f * std::asin(std::min(1.0f, 0.5f * (direction - spot.direction).norm()));
   if (angle >= spot.cutoff) return 0.0f;
   return angle <= spot.beamWidth ? 1.0f : (spot.cutoff - angle) / (spot.cutoff - spot.beamWidth);
@@ -35,12 +35,12 @@ std::optional<LightSample> fromPosition(const Vec3& position, const Rgb& intensi
       toLight / distance, distance, irradiance, 1.0f, SurfacePoint{position, Vec3::Zero(), Vec2::Zero(), 0.0f}, true};
 }
 
-/// On the plane at distance 1, of the unit square of texture coordinates.
+/// Area of the unit square of texture coordinates on the plane at distance 1.
 double areaOf(const ProjectedTexture& projected) {
   return 1.0 / (static_cast<double>(projected.u.norm()) * projected.v.norm());
 }
 
-/// The intensity that a spot light sends in a direction.
+/// The intensity of a spot light in a direction.
 Rgb intensityOf(const SpotLight& light, const Vec3& direction) {
   const float attenuation = falloff(light, direction);
   if (!(attenuation > 0.0f)) return Rgb::Zero();
@@ -49,8 +49,8 @@ Rgb intensityOf(const SpotLight& light, const Vec3& direction) {
   return intensity * light.texture->texture->eval(light.texture->uvOf(light.direction, direction));
 }
 
-/// The intensity that a projector sends in a direction: over the plane, cosines make it an irradiance that does not
-/// depend on where.
+/// The intensity of a projector in a direction. The factor 1/cos³ makes the irradiance on the image plane independent
+/// of the position.
 Rgb intensityOf(const ProjectorLight& light, const Vec3& direction) {
   const float cosine = light.direction.dot(direction);
   if (!(cosine > 0.0f)) return Rgb::Zero();

@@ -1,5 +1,5 @@
 #pragma once
-// Point, spot and directional lights: emitter sampling finds each of them for certain, nothing else ever does.
+// Point, spot, projector and directional lights. They are found by next-event estimation only.
 
 #include <optional>
 
@@ -7,16 +7,16 @@
 
 namespace lobe {
 
-/// Emitted flux, luminance; of a directional light, what enters the sphere. Where there is a texture, it counts by its
-/// mean: that is exact for a projector that shows whole periods of it.
+/// Emitted flux, luminance; for a directional light, the flux into the sphere. Textures count by their mean, which is
+/// exact for a projector that shows whole periods.
 double powerOf(const DeltaLight& light, const SceneSphere& sphere);
 
-/// What reaches the point if nothing is in between; its pdf is 1. nullopt: nothing does.
+/// The light that reaches the point if it is not occluded; its pdf is 1. nullopt: none.
 std::optional<LightSample> illuminate(const DeltaLight& light, const Vec3& point);
 
-/// A photon, of the flux on average: uniform over the solid angle that a point or spot light shines into, over the
-/// image of a projector, or over the disc that the sphere shows to a directional one. u1, u2 in [0,1)². nullopt: a
-/// photon of power zero.
+/// Samples a photon, whose expected power is the flux: uniform over the solid angle of a point or spot light, over the
+/// image of a projector, or over the disc to which the sphere projects for a directional light. u1, u2 in [0,1)².
+/// nullopt: a photon of zero power.
 std::optional<EmittedPhoton> emit(const DeltaLight& light, const SceneSphere& sphere, const Vec2& u1, const Vec2& u2);
 
 }  // namespace lobe

@@ -12,7 +12,7 @@ Rgb usable(const Rgb& c) {
   return result;
 }
 
-// A point of density 1 − |x| over [−1, 1], from u uniform in [0,1).
+// Samples the density 1 − |x| over [−1, 1]; u uniform in [0,1).
 float sampleTent(float u) {
   return u < 0.5f ? std::sqrt(2.0f * u) - 1.0f : 1.0f - std::sqrt(2.0f - 2.0f * u);
 }
@@ -51,7 +51,7 @@ Eigen::Vector2i EnvironmentLight::pixelOf(const Vec3& direction) const {
   return {std::min(static_cast<int>(p.x()), width_ - 1), std::min(static_cast<int>(p.y()), height_ - 1)};
 }
 
-// Columns wrap around, rows end at the poles. Pixels outside the block have no weight.
+// Columns wrap around, rows end at the poles. Pixels outside the block have weight 0.
 EnvironmentLight::Texel EnvironmentLight::interpolate(const Vec2& point, const PixelBlock& block) const {
   const float px = point.x() - 0.5f;
   const float py = point.y() - 0.5f;
@@ -97,7 +97,7 @@ int EnvironmentLight::sampleRow(const PixelBlock& block, float& u) const {
   return block.y0 + static_cast<int>(DiscreteDistribution(masses).sample(u));
 }
 
-// From interpolated weight to density over solid angle.
+// Converts an interpolated weight to a density over solid angle.
 float EnvironmentLight::density(float weight, float sine, const PixelBlock& block) const {
   if (sine <= 0.0f) return 0.0f;
   return static_cast<float>(weight * texels_.size() / (blockWeight(block) * 2.0 * kPi * kPi * sine));
@@ -122,7 +122,8 @@ std::optional<EnvironmentSample> EnvironmentLight::sample(const PixelBlock& bloc
   Vec2 rest = u;
   const int y = sampleRow(block, rest.y());
   const auto x = static_cast<int>(rows_[y].sample(rest.x(), block.x0, block.x1));
-  // A pixel's share of the interpolated image is a tent about its centre: around the seam, back at the poles.
+  // The contribution of a pixel to the interpolated image is a tent around its centre. It wraps around at the seam and
+  // is reflected at the poles.
   Coordinates c{{x + 0.5f + sampleTent(rest.x()), y + 0.5f + sampleTent(rest.y())}, 0.0f};
   if (c.point.x() < 0.0f) c.point.x() += width_;
   if (c.point.x() >= width_) c.point.x() -= width_;

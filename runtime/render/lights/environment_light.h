@@ -1,6 +1,7 @@
 #pragma once
-// Light from infinitely far. The image is interpolated bilinearly, and sampled by a density that is the bilinear
-// interpolation of pixel weights (luminance × sinθ at the pixel's centre), so that radiance over density hardly varies.
+// Environment light from infinity. The image is interpolated bilinearly and sampled with a density that is the bilinear
+// interpolation of pixel weights (luminance × sinθ at the pixel's centre), so that radiance / density is nearly
+// constant.
 
 #include <optional>
 
@@ -22,22 +23,22 @@ struct PixelBlock {
 
 class EnvironmentLight {
  public:
-  /// Values that are negative or not finite count as black.
+  /// Negative and non-finite values are treated as black.
   explicit EnvironmentLight(const Environment& environment);
 
-  /// ∫ luminance dω, in the interpolation's own quadrature. 0: black.
+  /// ∫ luminance dω by the quadrature of the pixel grid; 0 for a black environment.
   double flux() const { return flux_; }
 
   Rgb radiance(const Vec3& direction) const;
 
-  /// Draws by importance from the whole environment; u uniform in [0,1)². nullopt: the direction has no density
-  /// (poles).
+  /// Samples the whole environment by importance; u uniform in [0,1)². nullopt if the density of the direction is 0 (at
+  /// the poles).
   std::optional<EnvironmentSample> sample(const Vec2& u) const;
   float pdf(const Vec3& direction) const;
 
-  /// The same restricted to the weights of a block of pixels; a direction may leave the block by a pixel, as far as
-  /// interpolation carries its light. blockWeight(block) is positive. Densities of blocks that tile the image, weighted
-  /// by their share of the weight, sum to pdf.
+  /// Like sample(u) and pdf(direction), restricted to the weights of a block of pixels; because of the interpolation a
+  /// direction may be outside the block by up to one pixel. blockWeight(block) must be positive. The densities of
+  /// blocks that tile the image, weighted by their fractions of the total weight, sum to pdf(direction).
   std::optional<EnvironmentSample> sample(const PixelBlock& block, const Vec2& u) const;
   float pdf(const PixelBlock& block, const Vec3& direction) const;
   double blockWeight(const PixelBlock& block) const;
@@ -46,7 +47,7 @@ class EnvironmentLight {
   int height() const { return height_; }
   /// luminance × sinθ of a pixel.
   float weight(int x, int y) const { return texel(x, y).w(); }
-  /// The pixel that a direction falls into.
+  /// The pixel that contains a direction.
   Eigen::Vector2i pixelOf(const Vec3& direction) const;
 
  private:

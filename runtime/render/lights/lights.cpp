@@ -9,7 +9,7 @@
 namespace lobe {
 namespace {
 
-/// In double precision, as squares of the areas of small or large triangles leave the range of floats.
+/// In double precision, because squared areas of very small or large triangles exceed the range of float.
 std::vector<double> areasOfTriangles(const TriangleMesh& mesh) {
   std::vector<double> areas;
   areas.reserve(mesh.triangles.size());
@@ -20,7 +20,7 @@ std::vector<double> areasOfTriangles(const TriangleMesh& mesh) {
   return areas;
 }
 
-/// 0 for what has triangles or stands for other shapes.
+/// The area of an analytic shape; 0 for meshes and instances.
 float areaOfAnalytic(const Geometry& geometry) {
   if (const auto* sphere = std::get_if<Sphere>(&geometry)) return areaOf(*sphere);
   if (const auto* disk = std::get_if<Disk>(&geometry)) return areaOf(*disk);
@@ -28,7 +28,8 @@ float areaOfAnalytic(const Geometry& geometry) {
   return cylinder ? areaOf(*cylinder) : 0.0f;
 }
 
-// The cone that a sphere fills as seen from a point outside: 1 − cosθ without cancellation. nullopt: from inside.
+// The cone that a sphere subtends at a point outside, with 1 − cosθ computed without cancellation. nullopt for a point
+// inside.
 struct Cone {
   Vec3 axis;
   float distance;        // to the centre
@@ -48,7 +49,7 @@ float coneDensity(const Cone& cone) {
   return 0.5f * kInvPi / cone.oneMinusCosine;
 }
 
-// A direction uniform in the cone, and the first point of the sphere that it meets.
+// Samples a direction uniformly in the cone and finds the first point of the sphere in that direction.
 LightSample sampleCone(const Sphere& sphere, const Cone& cone, const Vec2& u) {
   const float oneMinusCosine = u.x() * cone.oneMinusCosine;
   const float cosine = 1.0f - oneMinusCosine;
@@ -66,7 +67,7 @@ LightSample sampleCone(const Sphere& sphere, const Cone& cone, const Vec2& u) {
   return result;
 }
 
-// From density over a surface's area to density over solid angle; 0 from behind.
+// Converts a density over surface area to one over solid angle; 0 from behind.
 float toSolidAngle(float areaDensity, float distance2, float cosine) {
   return cosine > 0.0f ? areaDensity * distance2 / cosine : 0.0f;
 }
@@ -108,20 +109,22 @@ Lights::Lights(const Scene& scene, const Eigen::AlignedBox3f& bounds)
   choose(powers);
 }
 
-// Power says nothing of what is near: a lamp beside the sky would hardly ever be chosen where it alone gives light.
-constexpr double kEvenFraction = 0.2;
+// Probability with which a light is chosen uniformly instead of by power. Power does not account for distance: a lamp
+// would hardly ever be chosen next to a bright sky, even where only the lamp gives light.
+constexpr double kUniformFraction = 0.2;
 
-// In double precision: in a scene of kilometres or micrometres powers may exceed what a float holds; shares do not.
+// In double precision: in very large or small scenes powers may exceed the range of float, but their fractions do not.
 void Lights::choose(const std::vector<double>& powers) {
+  double total = 0;
   std::size_t shining = 0;
   for (const double power : powers) {
-    totalPower_ += std::max(0.0, power);
+    total += std::max(0.0, power);
     shining += power > 0;
   }
   std::vector<float> weights;
   for (const double power : powers)
-    weights.push_back(power > 0 ? static_cast<float>((1 - kEvenFraction) * power / totalPower_ +
-                                                     kEvenFraction / static_cast<double>(shining))
+    weights.push_back(power > 0 ? static_cast<float>((1 - kUniformFraction) * power / total +
+                                                     kUniformFraction / static_cast<double>(shining))
                                 : 0.0f);
   choice_ = DiscreteDistribution(weights);
 }

@@ -1,5 +1,6 @@
 #pragma once
-// All emitters of a scene, chosen mostly by power: for the light that reaches a point, and for photons.
+// All emitters of a scene, chosen mostly in proportion to power, for next-event estimation and for the emission of
+// photons.
 
 #include <optional>
 #include <vector>
@@ -11,71 +12,70 @@
 
 namespace lobe {
 
-/// Light that would reach a point if nothing were in between.
+/// Light that reaches a point if it is not occluded.
 struct LightSample {
   Vec3 wi;         ///< unit, world space, towards the light
-  float distance;  ///< +infinity for light from infinitely far
-  Rgb radiance;    ///< of a delta light: the irradiance on a surface that faces it
-  float pdf;  ///< over solid angle at the point, with the choice of the light, > 0; of a delta light: of its choice
-  /// The point on the light (of a point light: without normal and offset); none for light from infinitely far.
+  float distance;  ///< infinite for lights at infinity
+  Rgb radiance;    ///< for a delta light, the irradiance on a surface that faces it
+  float pdf;       ///< over solid angle, with the choice of the light, > 0; for a delta light, of its choice only
+  /// The point on the light (for a point light without normal and offset); nullopt for lights at infinity.
   std::optional<SurfacePoint> source;
-  bool delta = false;  ///< from a point or in a single direction: nothing else finds it, its share of an estimate is 1
+  bool delta = false;  ///< a point or directional light: its multiple importance weight is 1
 };
 
 struct EmittedPhoton {
   Ray ray;
-  Rgb power;  ///< flux over the density of choosing light, point and direction
-  bool far;   ///< it came from infinitely far: ray.origin is only a start outside the scene
-  /// How densely Lights::sample would choose where it came from, with the choice of the light: over solid angle for the
-  /// environment, over area for surfaces; infinite for delta lights.
+  Rgb power;  ///< flux / density of choosing light, point and direction
+  bool far;   ///< emitted at infinity: ray.origin is only a starting point outside the scene
+  /// The density with which Lights::sample chooses the origin of the photon, with the choice of the light: over solid
+  /// angle for the environment, over area for surfaces; infinite for delta lights.
   float emitterDensity;
-  Vec3 normal;  ///< of the surface it left; zero when it left none
+  Vec3 normal;  ///< of the emitting surface; zero without a surface
 };
 
-/// Contains all shapes.
+/// Bounding sphere of the scene.
 struct SceneSphere {
   Vec3 centre = Vec3::Zero();
   float radius = 1;
 
-  /// The point of the disc that the sphere shows to the direction wi from which u in [0,1)² lets a photon start.
+  /// The starting point of a photon from the direction wi: the point for u in [0,1)² on the disc to which the sphere
+  /// projects in that direction.
   Vec3 start(const Vec3& wi, const Vec2& u) const;
 };
 
 class Lights {
  public:
-  /// The scene outlives the lights. bounds: of the scene's shapes.
+  /// The scene must outlive the lights. bounds: those of the scene's shapes.
   Lights(const Scene& scene, const Eigen::AlignedBox3f& bounds);
 
-  /// No light at all: nothing may be sampled.
+  /// Whether there is no light; then nothing may be sampled.
   bool empty() const { return choice_.total() <= 0; }
 
   /// Chooses a light, then a direction towards it; choice uniform in [0,1), u in [0,1)². nullopt: a sample of value
-  /// zero (the point is behind the light, say). Spheres are sampled by solid angle from outside, other surfaces by
-  /// area, the environment by radiance.
+  /// zero, for example if the point is behind the light. Spheres are sampled by solid angle from outside, other
+  /// surfaces by area, the environment by radiance.
   std::optional<LightSample> sample(const Vec3& point, float choice, const Vec2& u) const;
 
-  /// The density with which sample would have found, from `point`, the direction towards `hit` on a light; 0 when it is
-  /// not on the front of one.
+  /// The density with which sample finds, from `point`, the direction towards `hit` on a light; 0 if the hit is not on
+  /// the front side of a light.
   float pdf(const Vec3& point, const SurfaceHit& hit) const;
 
   Rgb environmentRadiance(const Vec3& direction) const;
   /// The density with which sample finds a direction by choosing the environment.
   float environmentPdf(const Vec3& direction) const;
 
-  /// Emission in proportion to power: from surfaces by area and cosine, from points uniformly over the solid angle they
-  /// light, from the environment by radiance and, as from directional lights, uniformly over the disc that the scene's
-  /// bounding sphere shows to that direction. Not for empty lights. nullopt: a photon of power zero.
+  /// Samples a photon in proportion to power: surfaces by area and cosine, point and spot lights uniformly over the
+  /// solid angle that they light, the environment by radiance. Photons from the environment and from directional lights
+  /// start uniformly on the disc to which the bounding sphere of the scene projects in that direction. Must not be
+  /// called if empty(). nullopt: a photon of zero power.
   std::optional<EmittedPhoton> samplePhoton(float choice, const Vec2& u1, const Vec2& u2) const;
 
-  /// A photon that arrives from a direction sampled elsewhere (a learnt density, say), as samplePhoton makes them; its
-  /// power does not contain the probability of choosing the environment.
+  /// A photon from a direction sampled elsewhere (by a learnt density, for example), otherwise as in samplePhoton; its
+  /// power is not divided by the probability of choosing the environment.
   EmittedPhoton photonFromEnvironment(const EnvironmentSample& from, const Vec2& u) const;
 
-  /// The u for which photonFromEnvironment makes the photon that travels along −wi through the point (of the scene).
+  /// The u for which photonFromEnvironment returns the photon that travels along −wi through a point of the scene.
   Vec2 photonCoordinates(const Vec3& point, const Vec3& wi) const;
-
-  /// Emitted flux of all lights, luminance (from infinitely far: what enters the bounding sphere).
-  double totalPower() const { return totalPower_; }
 
   const EnvironmentLight* environment() const { return environment_ ? &*environment_ : nullptr; }
   /// The probability of choosing the environment.
@@ -106,7 +106,6 @@ class Lights {
   std::vector<int> lightOfShape_;  // index into areas_, −1: none
   std::optional<EnvironmentLight> environment_;
   DiscreteDistribution choice_;  // areas_, then the scene's delta lights, then the environment
-  double totalPower_ = 0;
 };
 
 }  // namespace lobe

@@ -1,5 +1,5 @@
 #pragma once
-// A scene made ready to be rendered.
+// A scene with its ray tracer and lights.
 
 #include "runtime/render/geometry/raytracer.h"
 #include "runtime/render/lights/lights.h"
@@ -7,10 +7,10 @@
 namespace lobe {
 
 struct RenderScene {
-  /// The scene outlives it.
+  /// The scene must outlive it.
   explicit RenderScene(const Scene& s) : scene(s), tracer(s), lights(s, tracer.bounds()) {}
 
-  /// Whether the light of a sample taken for `from.position` arrives there.
+  /// Whether a light sample taken at `from.position` is unoccluded.
   bool visible(const SurfacePoint& from, const LightSample& light) const;
 
   const Scene& scene;
@@ -20,7 +20,7 @@ struct RenderScene {
 
 inline bool RenderScene::visible(const SurfacePoint& from, const LightSample& light) const {
   if (!light.source) return !tracer.occluded(spawnRay(from, light.wi));
-  // Both ends are moved off their surfaces, and the segment is cut a little short of the light besides.
+  // Both end points are moved off their surfaces, and the segment ends slightly before the light.
   const Vec3 origin = offsetPoint(from, light.wi);
   const Vec3 target = offsetPoint(*light.source, -light.wi);
   return !tracer.occluded({origin, target - origin, 1.0f - 0x1p-18f});

@@ -15,7 +15,7 @@ PixelBlock EnvironmentGuide::block(int index) const {
 }
 
 int EnvironmentGuide::blockOf(const Vec3& wi) const {
-  // The block of a pixel inverts the integer division above: the last one that begins at or before the pixel.
+  // Inverts the integer division in block(): the last block that begins at or before the pixel.
   const Eigen::Vector2i pixel = environment_.pixelOf(wi);
   const int column = ((pixel.x() + 1) * kBlockColumns - 1) / environment_.width();
   const int row = ((pixel.y() + 1) * kBlockRows - 1) / environment_.height();
@@ -27,14 +27,14 @@ int EnvironmentGuide::cellOf(const Vec2& u) {
 }
 
 void EnvironmentGuide::learn(const Vec3& point, const Vec3& wi, float weight) {
-  // Few importons leave: each speaks for the cells around its own, too, else the first photons of every cell that none
-  // has found yet would weigh more than all others together.
+  // Few importons leave the scene, so each also contributes to the neighbouring cells. Otherwise the first photons of
+  // cells that few importons have reached would outweigh all others.
   const Vec2 u = lights_.photonCoordinates(point, wi);
   float* const cells = &weights_[static_cast<std::size_t>(blockOf(wi)) * kCells * kCells];
   for (int dy = -1; dy <= 1; ++dy)
     for (int dx = -1; dx <= 1; ++dx) {
       const int x = std::clamp(static_cast<int>(u.x() * kCells) + dx, 0, kCells - 1);
-      const int y = (static_cast<int>(u.y() * kCells) + dy + kCells) % kCells;  // the azimuth
+      const int y = (static_cast<int>(u.y() * kCells) + dy + kCells) % kCells;  // the azimuth wraps around
       cells[y * kCells + x] += weight / static_cast<float>((1 + std::abs(dx)) * (1 + std::abs(dy)) * 4);
     }
 }
@@ -54,7 +54,8 @@ std::optional<EmittedPhoton> EnvironmentGuide::sample(float choice, const Vec2& 
   const PixelBlock pixels = block(index);
   if (environment_.blockWeight(pixels) <= 0) return std::nullopt;
   const std::optional<EnvironmentSample> from = environment_.sample(pixels, u1);
-  // Interpolation carries directions over a block's border; there the neighbour's photons do the work.
+  // Interpolation can move a direction across the border of a block; such directions are covered by the neighbouring
+  // block.
   if (!from || blockOf(from->wi) != index) return std::nullopt;
   const int row = cell / kCells;
   const Vec2 corner(static_cast<float>(cell % kCells), static_cast<float>(row));

@@ -3,11 +3,11 @@
 namespace lobe {
 namespace {
 
-/// How light from infinitely far reaches a point.
+/// How light from the environment reaches a point.
 enum class Passage { blocked, free, refracted };
 
-/// Follows the direction through surfaces that only refract, as if they did not bend it: exact for panes, and near
-/// enough to learn where photons should start.
+/// Follows the direction through surfaces that refract, ignoring the change of direction: exact for window panes, and
+/// accurate enough to learn where photons should start.
 Passage passageToEnvironment(const RayTracer& tracer, const SurfacePoint& from, const Vec3& direction) {
   constexpr int maxSurfaces = 16;
   Passage passage = Passage::free;
@@ -34,7 +34,7 @@ void ImportonWalk::run(const Ray& cameraRay, std::uint64_t index) {
   recorder_.end();
 }
 
-// One segment and what happens at its end; false: the path is over.
+// Traces one segment and processes its end point; returns false when the path ends.
 bool ImportonWalk::advance() {
   const std::optional<SurfaceHit> hit = scene_.tracer.trace(state_.ray);
   if (awaitsDistance_) recorder_.setDistance(hit ? hit->distance : kInfinity);
@@ -72,14 +72,16 @@ bool ImportonWalk::goOn(const SurfaceHit& hit, const GuidedSampler::Vertex* vert
   return survivesAlbedo(state_.weight, hit, rng_) && usable(luminance(state_.weight));
 }
 
-// What comes straight from the camera, or by mirrors only, guides no photon: it would end in the lens.
+// Importance that arrives from the camera directly or only by specular reflection is not stored: photons guided by it
+// would travel into the lens.
 void ImportonWalk::arrive(const SurfaceHit& hit) {
   if (wishes_.importance && scattered_)
     result_.importance.addPhoton(asFloats(hit.position), asFloats(normalTowards(hit)), asFloats(hit.woWorld),
                                  luminance(state_.weight), hit.distance, 0);
 }
 
-// Light that the camera sees directly needs no photons; that of first surfaces is shared with emitter sampling.
+// Environment light that the camera sees directly needs no photons; elsewhere it is weighted against next-event
+// estimation.
 void ImportonWalk::escape() {
   const Vec3& wi = state_.ray.direction;
   const float fraction = pdf_ > 0 ? misWeight(pdf_, scene_.lights.environmentPdf(wi)) : 1.0f;
@@ -108,7 +110,8 @@ void ImportonWalk::addDirectLight(const SurfaceHit& hit, const GuidedSampler::Ve
 void ImportonWalk::addEnvironmentLight(const SurfaceHit& hit, const Vec3& wi, const Rgb& light, float weight) {
   const Passage passage = passageToEnvironment(scene_.tracer, hit, wi);
   if (passage == Passage::free) collect(light * weight);
-  // What reaches the first surface freely is the renderer's own emitter sampling's work; through panes it has none.
+  // Unoccluded light at the first surface is left to the renderer's next-event estimation, which does not find light
+  // through panes.
   if (!wishes_.uses || passage == Passage::blocked || (passage == Passage::free && depth_ == 1)) return;
   result_.uses.push_back({hit.position, wi, luminance(light) * (passage == Passage::free ? weight : 1.0f)});
 }

@@ -1,6 +1,6 @@
 #pragma once
-// One path from the camera in training. It says where records are needed, where photons of the environment should
-// start, how important light is that travels against it, and what light it found itself.
+// A camera path in training. It requests records, and collects where photons from the environment should start, the
+// importance that arrives at surfaces, and the incident radiance that the path finds.
 
 #include <cstdint>
 #include <vector>
@@ -12,7 +12,7 @@
 
 namespace lobe {
 
-/// A photon of the environment that travels along −wi through the point would carry `weight` to the picture.
+/// A photon from the environment that travels along −wi through the point would contribute `weight` to the image.
 struct EnvironmentUse {
   Vec3 point;
   Vec3 wi;
@@ -20,22 +20,22 @@ struct EnvironmentUse {
 };
 
 struct ImportonResult {
-  SampleStorage radiance;    ///< incident light that the paths found, and requests for records of it
-  SampleStorage importance;  ///< what arrived from the camera after a first scattering, as photons
+  SampleStorage radiance;    ///< incident radiance found by the paths, and requests for radiance records
+  SampleStorage importance;  ///< importance that arrives after the first non-delta scattering, stored as photons
   std::vector<EnvironmentUse> uses;
 };
 
-/// What to spend time on.
+/// What a walk collects.
 struct ImportonWishes {
-  bool uses = false;        ///< the scene has an environment that photons may start from
-  bool importance = false;  ///< photons are to be guided
-  bool samples = false;     ///< records learn from camera paths
-  bool fractions = false;   ///< records learn from them how often the BSDF is to choose
+  bool uses = false;        ///< where photons should start; only for scenes with an environment
+  bool importance = false;  ///< importance, to guide photons
+  bool samples = false;     ///< incident radiance, from which records learn
+  bool fractions = false;   ///< samples from which records learn their BSDF sampling fractions
 };
 
 class ImportonWalk {
  public:
-  /// All outlive it; the walk appends to the result.
+  /// All references must outlive the walk, which appends to the result.
   ImportonWalk(const RenderScene& scene, const GuidedSampler& sampler, const ImportonWishes& wishes, Rng& rng,
                ImportonResult& result)
       : scene_(scene),
@@ -45,12 +45,12 @@ class ImportonWalk {
         result_(result),
         recorder_(result.radiance, {wishes.samples, wishes.fractions}) {}
 
-  /// index: of the path, told to the storages.
+  /// index: number of the path, passed to the sample storages.
   void run(const Ray& cameraRay, std::uint64_t index);
 
  private:
   bool advance();
-  /// Scatters. vertex: as scatter takes it. False: the path is over.
+  /// Scatters; for vertex see scatter(). Returns false when the path ends.
   bool goOn(const SurfaceHit& hit, const GuidedSampler::Vertex* vertex);
   void arrive(const SurfaceHit& hit);
   void escape();
@@ -67,9 +67,9 @@ class ImportonWalk {
 
   ParticleState state_;
   int depth_ = 0;
-  float pdf_ = 0;                // of the last direction; 0 after the camera or a delta part
-  bool scattered_ = false;       // not by delta parts alone
-  bool awaitsDistance_ = false;  // of the last vertex
+  float pdf_ = 0;                // of the last direction; 0 after the camera or a delta component
+  bool scattered_ = false;       // at a non-delta component at least once
+  bool awaitsDistance_ = false;  // the recorder needs the distance from the last vertex
   Vec3 previous_ = Vec3::Zero();
   PathRecorder recorder_;
 };

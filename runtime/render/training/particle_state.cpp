@@ -11,9 +11,9 @@ std::optional<Scattered> scatterDelta(const SurfaceHit& hit, float fraction, flo
 
 }  // namespace
 
-std::optional<Scattered> scatter(const SurfaceHit& hit, const GuidedSampler::Vertex* vertex,
-                                 Transport transport, Rng& rng) {
-  // Refraction scales radiance, not flux.
+std::optional<Scattered> scatter(const SurfaceHit& hit, const GuidedSampler::Vertex* vertex, Transport transport,
+                                 Rng& rng) {
+  // Sample weights include the scaling of radiance by refraction, which does not apply to flux.
   float (*const fluxScale)(float) =
       transport == Transport::flux ? [](float eta) { return eta * eta; } : [](float) { return 1.0f; };
   const float delta = hit.bsdf->deltaProbability(hit.wo, hit.uv);

@@ -1,5 +1,5 @@
 #pragma once
-// One scattering event of a particle in training, for importons and photons alike.
+// A scattering event of an importon or photon in training.
 
 #include <optional>
 
@@ -7,7 +7,7 @@
 
 namespace lobe {
 
-/// Training needs no path to be complete: light that has bounced this often is spread out.
+/// Longest training path, in segments. Paths may be truncated: light that has bounced this often is nearly uniform.
 inline constexpr int kMaxTrainingDepth = 32;
 
 /// A particle between two surfaces.
@@ -16,26 +16,27 @@ struct ParticleState {
   Rgb weight;
 };
 
-/// What flows along the particle's path: radiance against its direction (importons), or flux along it (photons).
+/// The quantity that a particle carries: radiance against its direction (importons), or flux along it (photons).
 enum class Transport { radiance, flux };
 
 struct Scattered {
   Vec3 wi;         ///< unit, local
   Vec3 direction;  ///< the same in world space
-  Rgb weight;      ///< f·|cosθ| over pdf (as flux for photons)
-  float pdf;       ///< over solid angle; 0 for the delta part
+  Rgb weight;      ///< f·|cosθ| / pdf, scaled to flux for photons
+  float pdf;       ///< over solid angle; 0 for the delta component
 };
 
-/// Scatters at hit with the smooth part's direction drawn at vertex, which is not null where deltaProbability is under 1.
-/// nullopt: the particle is absorbed.
-std::optional<Scattered> scatter(const SurfaceHit& hit, const GuidedSampler::Vertex* vertex,
-                                 Transport transport, Rng& rng);
+/// Scatters a particle. The direction of the non-delta component is sampled at `vertex`, which must not be null if
+/// deltaProbability is below 1. nullopt: the particle is absorbed.
+std::optional<Scattered> scatter(const SurfaceHit& hit, const GuidedSampler::Vertex* vertex, Transport transport,
+                                 Rng& rng);
 
-/// Russian roulette in proportion to what the surface takes on average, whatever direction was drawn: guiding may make
-/// weights small where many particles go, and these must not die of it. Divides the weight of those that survive.
+/// Russian roulette with the surface's albedo as survival probability, whatever direction was sampled: guiding gives
+/// small weights to particles in directions where there are many, which must not be terminated for that reason. Divides
+/// the weight of survivors by the probability.
 bool survivesAlbedo(Rgb& weight, const SurfaceHit& hit, Rng& rng);
 
-/// The geometric normal on the side that the particle came from.
+/// The geometric normal on the side from which the particle arrives.
 inline Vec3 normalTowards(const SurfaceHit& hit) {
   return std::copysign(1.0f, hit.normal.dot(hit.woWorld)) * hit.normal;
 }

@@ -6,10 +6,10 @@ namespace lobe {
 namespace {
 
 constexpr int kChunk = 1024;
-// Photons come after importons in the order of paths.
+// Path numbers of photons follow those of importons.
 constexpr std::uint64_t kFirstPhoton = std::uint64_t{1} << 32;
 
-/// Runs trace(i, rng, result) for i below count, in chunks that any thread may take; the results come in order.
+/// Runs trace(i, rng, result) for all i < count in parallel chunks; the results are in order.
 template <class Result, class Trace>
 std::vector<Result> traceChunks(std::uint64_t seed, std::uint64_t stream, int count, const Trace& trace) {
   const int chunks = (count + kChunk - 1) / kChunk;
@@ -67,7 +67,7 @@ std::optional<EmittedPhoton> ParticleTracer::emit(Rng& rng) const {
   const float choice = rng.uniform();
   const Vec2 u1 = rng.uniform2();
   const Vec2 u2 = rng.uniform2();
-  // The environment is the last light: choices below 1 − environment mean surfaces.
+  // The environment is the last light: choices below 1 − environment select other lights.
   if (choice < 1 - environment) return scene_.lights.samplePhoton(choice, u1, u2);
   std::optional<EmittedPhoton> photon = guide_->sample((choice - (1 - environment)) / environment, u1, u2);
   if (photon) photon->power /= environment;

@@ -1,5 +1,5 @@
 #pragma once
-// Traces the particles that training learns from, in parallel. What is traced depends on seed and pass only, never on
+// Traces the particles for training in parallel. The results depend only on seed and pass, not on the number of
 // threads.
 
 #include <vector>
@@ -11,8 +11,8 @@ namespace lobe {
 
 class ParticleTracer {
  public:
-  /// All outlive it. radiance guides importons, importance guides photons; guide: where photons of the environment
-  /// start, nullptr without an environment.
+  /// All references must outlive the tracer. radiance guides importons, importance guides photons. guide: guides the
+  /// emission of photons from the environment, nullptr without an environment.
   ParticleTracer(const RenderScene& scene, const RayCamera& camera, const GuidedSampler& radiance,
                  const GuidedSampler& importance, const EnvironmentGuide* guide, std::uint64_t seed);
 

@@ -7,15 +7,16 @@
 namespace lobe {
 namespace {
 
-// The weight window (training notes, "Parameters"), in shares of the emitted power.
+// Weight window, relative to the emitted power.
 constexpr float kLowestWeight = 1e-6f;
 constexpr float kHighestWeight = 2 + kLowestWeight;
-constexpr int kMaxWaiting = 64;  // of one photon that wait at a time
-// Of one photon in all. Surfaces that return more light than they receive would split it without end.
+constexpr int kMaxWaiting = 64;  // branches of one photon in the queue
+// Branches of one photon in total. Surfaces that reflect more light than they receive would otherwise split it
+// endlessly.
 constexpr int kMaxBranchesOfPhoton = 512;
 
-/// What BSDF sampling is left with where emitter sampling finds the same light (nothing of a delta light's); a cosine
-/// stands for the density to come.
+/// Multiple importance weight of BSDF sampling against next-event estimation, 0 for delta lights. The density cosθ/π
+/// replaces that of BSDF sampling, which is not yet known.
 float directFraction(const EmittedPhoton& photon, const SurfaceHit& hit) {
   const float cosine = std::abs(hit.normal.dot(hit.woWorld));
   float emitter = photon.emitterDensity;
@@ -42,7 +43,7 @@ void PhotonWalk::run(const EmittedPhoton& photon, std::uint64_t index) {
   }
 }
 
-// One segment, what happens at its end, and the branches that leave from there.
+// Traces one segment, stores the photon at its end point, and scatters the branches that leave from there.
 void PhotonWalk::advance(const EmittedPhoton& photon, const Branch& branch) {
   const std::optional<SurfaceHit> hit = scene_.tracer.trace(branch.state.ray);
   if (!hit || !hit->bsdf || !sidesAgree(*hit, hit->woWorld, hit->wo)) return;
@@ -75,8 +76,8 @@ void PhotonWalk::store(const EmittedPhoton& photon, const Branch& branch, const 
                                first && photon.far ? kInfinity : hit.distance, flux);
 }
 
-// How many branches go on: none, by chance, of a photon that carries next to nothing, several of one that carries too
-// much, so that no particle to come speaks for many.
+// Number of branches that continue. Below the window, Russian roulette may terminate the photon; above it the photon is
+// split, so that no particle has a very large weight.
 int PhotonWalk::applyWeightWindow(Rgb& weight) {
   const float relative = luminance(weight) / power_;
   if (!usable(relative)) return 0;

@@ -1,5 +1,5 @@
 #pragma once
-// One photon in training: light carried from an emitter to all surfaces that it meets.
+// The path of a photon in training: it is stored at every surface that it reaches from an emitter.
 
 #include <cstdint>
 #include <vector>
@@ -11,17 +11,18 @@
 namespace lobe {
 
 struct PhotonResult {
-  SampleStorage radiance;    ///< every arrival at a surface that is not only delta
-  SampleStorage importance;  ///< requests for records where guiding by importance found none
+  SampleStorage radiance;    ///< every arrival at a surface that is not purely specular
+  SampleStorage importance;  ///< requests for importance records where there are none
 };
 
 class PhotonWalk {
  public:
-  /// All outlive it; the walk appends to the result. importance: guides directions, it has learnt from importons.
+  /// All references must outlive the walk, which appends to the result. importance: guides directions by what was
+  /// learnt from importons.
   PhotonWalk(const RenderScene& scene, const GuidedSampler& importance, Rng& rng, PhotonResult& result)
       : scene_(scene), importance_(importance), rng_(rng), result_(result) {}
 
-  /// index: of the path, told to the storages.
+  /// index: number of the path, passed to the sample storages.
   void run(const EmittedPhoton& photon, std::uint64_t index);
 
  private:
@@ -30,7 +31,7 @@ class PhotonWalk {
     int depth;
   };
   void advance(const EmittedPhoton& photon, const Branch& branch);
-  /// Scatters the branches that leave a surface. vertex: as scatter takes it.
+  /// Scatters the branches that leave a surface; for vertex see scatter().
   void branchOff(Branch branch, const SurfaceHit& hit, const GuidedSampler::Vertex* vertex);
   void store(const EmittedPhoton& photon, const Branch& branch, const SurfaceHit& hit);
   int applyWeightWindow(Rgb& weight);
@@ -39,9 +40,9 @@ class PhotonWalk {
   const GuidedSampler& importance_;
   Rng& rng_;
   PhotonResult& result_;
-  float power_ = 0;  // emitted, luminance
+  float power_ = 0;  // emitted power, luminance
   std::vector<Branch> waiting_;
-  int made_ = 0;  // branches by splitting
+  int made_ = 0;  // number of branches made by splitting
 };
 
 }  // namespace lobe

@@ -11,25 +11,27 @@
 namespace lobe {
 namespace {
 
-/// Importance only steers photons: half the components and neighbours do (measured by lobebench-illumination).
+/// Importance only guides photons; half the components and neighbours suffice (measured by lobebench-illumination).
 FieldOptions importanceOptions(FieldOptions options) {
   options.components = std::max(1, options.components / 2);
   options.neighbours = std::max(1, options.neighbours / 2);
   return options;
 }
 
-/// How much of the plan's particles each pass traces. All, where time is not limited. Where it is, passes begin small
-/// and double: so even short training is of several passes, and none begins that would end much too late.
+/// The fraction of the plan's particles that each pass traces: 1 without a time limit. With a limit, passes start small
+/// and double in size, so that even a short training has several passes, and no pass begins that would end long after
+/// the limit.
 class PassSizes {
  public:
   explicit PassSizes(const TrainingPlan& plan) : limit_(plan.seconds), next_(limit_ < kInfinity ? firstOf(plan) : 1) {}
 
-  /// Of the next pass, in (0, 1]; nullopt: it would not end in time. The first pass always is.
+  /// The fraction for the next pass, in (0, 1]; nullopt if it would not end in time. The first pass always runs.
   std::optional<double> next() const {
     if (taken_ == 0 || limit_ == kInfinity) return next_;
     const double left = limit_ - watch_.seconds();
     const double fitting = std::min(next_, last_ * left / taken_);
-    // A pass that brings less than the one before takes its time from rendering for little.
+    // A pass smaller than the one before improves the records less than rendering for the same time would improve the
+    // image.
     return fitting >= std::min(last_, next_) ? std::optional(fitting) : std::nullopt;
   }
 
@@ -43,7 +45,7 @@ class PassSizes {
 
  private:
   static double firstOf(const TrainingPlan& plan) {
-    constexpr double kFirstParticles = 25000;  // a fifth of a second in the kitchen
+    constexpr double kFirstParticles = 25000;  // 0.2 s in the kitchen scene
     return std::min(1.0, kFirstParticles / (static_cast<double>(plan.photons) + plan.importons));
   }
 
@@ -52,8 +54,8 @@ class PassSizes {
   Stopwatch watch_;
 };
 
-/// One training run. Importons are guided by the light learnt in the passes before, photons by the importance that
-/// importons have brought.
+/// One training run. Importons are guided by the radiance learnt in previous passes, photons by the importance learnt
+/// from importons.
 class Training {
  public:
   Training(const RenderScene& scene, const RayCamera& camera, const LobeCacheSet* caches, const TrainingPlan& plan)
@@ -72,7 +74,7 @@ class Training {
   Training(const Training&) = delete;
   Training& operator=(const Training&) = delete;
 
-  /// size: see PassSizes.
+  /// size: fraction of the plan's particles, see PassSizes.
   PassReport runPass(int pass, double size) {
     const Stopwatch watch;
     ImportonResult importons = tracer_->traceImportons(pass, fractionOf(plan_.importons, size), wishes_);
@@ -86,7 +88,7 @@ class Training {
     samples_.merge(std::move(photons.radiance));
     importons.importance.merge(std::move(photons.importance));
     PassReport report{0, samples_.particles(), 0, std::nullopt};
-    // Side by side: what one has to do in order leaves room for the other.
+    // The updates run in parallel, because each has sequential parts that leave threads idle.
     oneapi::tbb::parallel_invoke([&] { importance_.update(importons.importance); },
                                  [&] { report.logLikelihood = radiance_.update(samples_); });
     report.records = radiance_.records();
@@ -94,7 +96,7 @@ class Training {
     return report;
   }
 
-  /// Radii have shrunk since the last requests were made: a last look closes the gaps.
+  /// Fills the gaps between records whose radii have shrunk since the last requests.
   void finish(int passes, double size) {
     radiance_.fill(tracer_->traceImportons(passes, fractionOf(plan_.importons, size), {}).radiance, samples_);
   }
@@ -128,10 +130,10 @@ void TrainingPlan::validate() const {
   const auto require = [](bool condition, const char* message) {
     if (!condition) throw std::runtime_error(message);
   };
-  require(passes >= 1, "training passes: at least 1");
-  require(photons >= 1, "training photons: at least 1");
-  require(importons >= 1, "training importons: at least 1");
-  require(seconds > 0, "training seconds: over 0");
+  require(passes >= 1, "training passes: must be at least 1");
+  require(photons >= 1, "training photons: must be at least 1");
+  require(importons >= 1, "training importons: must be at least 1");
+  require(seconds > 0, "training seconds: must be positive");
   records.validate();
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// Trains the illumination of a scene, pass by pass.
+// Trains the illumination field of a scene in several passes.
 
 #include <functional>
 #include <map>
@@ -11,23 +11,24 @@
 
 namespace lobe {
 
-/// What records learn from.
+/// The source of training samples.
 enum class TrainFrom { photons, paths, both };
-/// As the tools' options spell them.
+/// The names that the tools' options use.
 std::map<std::string, TrainFrom> trainFromNames();
 
 struct TrainingPlan {
   TrainFrom from = TrainFrom::both;
   int passes = 8;
-  int photons = 300000;    ///< a pass; none are traced for TrainFrom::paths
-  int importons = 100000;  ///< a pass
-  /// Passes end by then, as far as can be foreseen: they begin small and double. Results depend on the machine's speed.
+  int photons = 300000;    ///< per pass; none are traced for TrainFrom::paths
+  int importons = 100000;  ///< per pass
+  /// Time limit, observed as far as pass times can be predicted: passes start small and double in size. Results then
+  /// depend on the speed of the machine.
   double seconds = kInfinity;
   std::uint64_t seed = 1;
-  bool learnFractions =
-      true;  ///< of the BSDF, by record, else kProductProbabilities; without caches there is nothing to learn
-  bool keepParticles = false;  ///< of the last pass, for TrainedIllumination::particles
-  FieldOptions records;        ///< but for the scene's diagonal, which training sets
+  /// Records learn BSDF sampling fractions; otherwise, and without caches, that of kProductProbabilities is used.
+  bool learnFractions = true;
+  bool keepParticles = false;  ///< keep those of the last pass in TrainedIllumination::particles
+  FieldOptions records;        ///< except for the scene's diagonal, which training sets
 
   /// Throws std::runtime_error that names the field.
   void validate() const;
@@ -35,9 +36,9 @@ struct TrainingPlan {
 
 struct PassReport {
   double seconds;
-  std::uint64_t particles;  ///< that records could learn from
+  std::uint64_t particles;  ///< number of particles from which records could learn
   std::size_t records;      ///< after the pass
-  /// Of the pass's particles before they were learnt from, see IlluminationTrainer::learn.
+  /// Mean log-likelihood of the pass's particles before the update, see IlluminationTrainer::learn.
   std::optional<double> logLikelihood;
 };
 
@@ -45,7 +46,7 @@ struct TrainingReport {
   std::vector<PassReport> passes;
   double seconds = 0;
   double undersampledFraction = 0;
-  bool learntFractions = false;  ///< records know how often the BSDF is to choose
+  bool learntFractions = false;  ///< records have learnt BSDF sampling fractions
 
   std::uint64_t particles() const;
 };
@@ -53,11 +54,11 @@ struct TrainingReport {
 struct TrainedIllumination {
   Field field;
   TrainingReport report;
-  SampleStorage particles;  ///< of the last pass, where kept
+  SampleStorage particles;  ///< of the last pass, if kept
 };
 
-/// caches: for the product; nullptr: paths in training are guided by illumination only. afterPass: called with what
-/// each pass did.
+/// caches: for the product; nullptr: training paths are guided by illumination only. afterPass: called after each pass
+/// with its report.
 TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera& camera, const LobeCacheSet* caches,
                                       const TrainingPlan& plan,
                                       const std::function<void(const PassReport&)>& afterPass = {});
