@@ -35,6 +35,13 @@ struct DeltaSample {
   float eta;   ///< relative index of refraction as in BsdfSample; 1 for reflection and pass-through
 };
 
+/// The part of a delta component that passes to the other side of a surface in one direction.
+struct DeltaTransmission {
+  Vec3 wi;
+  Rgb weight;     ///< as DeltaSample::weight, but for the transmission alone: not divided by a probability
+  bool straight;  ///< wi is −wo
+};
+
 /// A lobe and its weight in a BSDF: ρ_bsdf ≈ Σ tint_i ρ_i + constant/π, in luminance, for wo above the surface.
 struct LobeTint {
   int lobe;  ///< index into Bsdf::lobes()
@@ -79,6 +86,14 @@ class Bsdf {
   virtual float deltaProbability(const Vec3& wo, const Vec2& uv) const {
     (void)wo, (void)uv;
     return 0.0f;
+  }
+
+  /// The transmission of the delta component, if there is exactly one direction of it, so that samples of sampleDelta
+  /// on the other side of the surface all have that direction. Next-event estimation follows it. nullopt: there is
+  /// none, it has several directions, or the model does not say.
+  virtual std::optional<DeltaTransmission> deltaTransmission(const Vec3& wo, const Vec2& uv) const {
+    (void)wo, (void)uv;
+    return std::nullopt;
   }
 
   /// The lobes of the smooth part for which caches are fitted; empty for diffuse and purely specular materials.

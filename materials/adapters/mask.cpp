@@ -34,6 +34,20 @@ class Mask final : public Bsdf {
     return result;
   }
 
+  /// Where both the surface and the nested model pass light, their directions may differ.
+  std::optional<DeltaTransmission> deltaTransmission(const Vec3& wo, const Vec2& uv) const override {
+    const Rgb a = opacity(uv);
+    const bool passes = (a < 1.0f).any();
+    std::optional<DeltaTransmission> nested;
+    if ((a > 0.0f).any()) nested = nested_->deltaTransmission(wo, uv);
+    if (!nested && (a > 0.0f).any() && nested_->transmits() && nested_->deltaProbability(wo, uv) > 0.0f)
+      return std::nullopt;  // in a direction that is not known
+    if (!nested) return passes ? std::optional(DeltaTransmission{-wo, 1.0f - a, true}) : std::nullopt;
+    if (passes && !nested->straight) return std::nullopt;
+    nested->weight = nested->weight * a + (1.0f - a);
+    return nested;
+  }
+
   float deltaProbability(const Vec3& wo, const Vec2& uv) const override {
     const Choice p = choiceAt(opacity(uv), wo, uv);
     return std::min(1.0f, p.pass + p.nestedDelta);

@@ -27,6 +27,9 @@ class NormalMapping : public Bsdf {
   std::optional<DeltaSample> sampleDelta(const Vec3& wo, const Vec2& uv, float choice) const final {
     return nested_->sampleDelta(wo, uv, choice);
   }
+  std::optional<DeltaTransmission> deltaTransmission(const Vec3& wo, const Vec2& uv) const final {
+    return nested_->deltaTransmission(wo, uv);
+  }
   float deltaProbability(const Vec3& wo, const Vec2& uv) const final { return nested_->deltaProbability(wo, uv); }
   std::span<const LobePtr> lobes() const final { return nested_->lobes(); }
   LobeMixture mixture(const Vec3& wo, const Vec2& uv) const final { return nested_->mixture(wo, uv); }

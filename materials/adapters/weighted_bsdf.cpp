@@ -102,6 +102,29 @@ std::optional<DeltaSample> WeightedBsdf::sampleDelta(const Vec3& wo, const Vec2&
   return result;
 }
 
+std::optional<DeltaTransmission> WeightedBsdf::deltaTransmission(const Vec3& wo, const Vec2& uv) const {
+  const PartWeights all = weights(uv);
+  std::optional<DeltaTransmission> result;
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    if (!(all[i] > 0.0f)) continue;
+    const std::optional<DeltaTransmission> part = parts_[i]->deltaTransmission(wo, uv);
+    if (!part) {
+      // A part that says nothing may pass light in another direction than the others.
+      if (parts_[i]->transmits() && parts_[i]->deltaProbability(wo, uv) > 0.0f) return std::nullopt;
+      continue;
+    }
+    if (!result) {
+      result = part;
+      result->weight *= all[i];
+    } else if (result->straight && part->straight) {
+      result->weight += all[i] * part->weight;
+    } else {
+      return std::nullopt;
+    }
+  }
+  return result;
+}
+
 float WeightedBsdf::deltaProbability(const Vec3& wo, const Vec2& uv) const {
   const Split parts = split(wo, uv);
   const float smooth = sum(parts.smooth);

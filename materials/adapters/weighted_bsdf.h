@@ -27,6 +27,7 @@ class WeightedBsdf : public Bsdf {
   std::optional<BsdfSample> sample(const Vec3& wo, const Vec2& uv, float choice, const Vec2& u) const final;
   float pdf(const Vec3& wo, const Vec3& wi, const Vec2& uv) const final;
   std::optional<DeltaSample> sampleDelta(const Vec3& wo, const Vec2& uv, float choice) const final;
+  std::optional<DeltaTransmission> deltaTransmission(const Vec3& wo, const Vec2& uv) const final;
   float deltaProbability(const Vec3& wo, const Vec2& uv) const final;
   std::span<const LobePtr> lobes() const final { return lobes_; }
   LobeMixture mixture(const Vec3& wo, const Vec2& uv) const final;

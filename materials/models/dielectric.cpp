@@ -29,9 +29,17 @@ class Dielectric final : public Bsdf {
     const float p = luminance(reflected) / total;
     if (choice < p) return DeltaSample{Vec3(-wo.x(), -wo.y(), wo.z()), reflected / p, 1.0f};
     const float e = static_cast<float>(eta);
-    const float z = static_cast<float>(std::copysign(fresnel.cosTransmitted, -wo.z()));
     // Refraction compresses solid angles in the denser medium, so that L/n² is conserved and not L.
-    return DeltaSample{Vec3(-wo.x() / e, -wo.y() / e, z), refracted / ((1.0f - p) * e * e), e};
+    return DeltaSample{refractedDirection(wo, fresnel, e), refracted / ((1.0f - p) * e * e), e};
+  }
+  std::optional<DeltaTransmission> deltaTransmission(const Vec3& wo, const Vec2& uv) const override {
+    const double eta = wo.z() > 0.0f ? eta_ : 1.0 / eta_;
+    const DielectricFresnel fresnel = fresnelDielectric(std::abs(wo.z()), eta);
+    const float passed = static_cast<float>(1.0 - fresnel.reflectance);
+    if (!(passed > 0.0f) || wo.z() == 0.0f) return std::nullopt;  // total internal reflection
+    const float e = static_cast<float>(eta);
+    return DeltaTransmission{refractedDirection(wo, fresnel, e), passed / (e * e) * transmittance_->eval(uv),
+                             e == 1.0f};
   }
   float deltaProbability(const Vec3&, const Vec2&) const override { return 1.0f; }
 
@@ -47,6 +55,10 @@ class Dielectric final : public Bsdf {
   bool transmits() const override { return true; }
 
  private:
+  static Vec3 refractedDirection(const Vec3& wo, const DielectricFresnel& fresnel, float eta) {
+    return {-wo.x() / eta, -wo.y() / eta, static_cast<float>(std::copysign(fresnel.cosTransmitted, -wo.z()))};
+  }
+
   double eta_;  ///< inside over outside
   TexturePtr reflectance_;
   TexturePtr transmittance_;

@@ -14,6 +14,9 @@ class Null final : public Bsdf {
   std::optional<DeltaSample> sampleDelta(const Vec3& wo, const Vec2&, float) const override {
     return DeltaSample{-wo, Rgb::Ones(), 1.0f};
   }
+  std::optional<DeltaTransmission> deltaTransmission(const Vec3& wo, const Vec2&) const override {
+    return DeltaTransmission{-wo, Rgb::Ones(), true};
+  }
   float deltaProbability(const Vec3&, const Vec2&) const override { return 1.0f; }
 
   LobeMixture mixture(const Vec3&, const Vec2&) const override { return {}; }

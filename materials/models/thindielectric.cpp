@@ -30,6 +30,9 @@ class ThinDielectric final : public Bsdf {
     if (choice < p) return DeltaSample{Vec3(-wo.x(), -wo.y(), wo.z()), reflected / p, 1.0f};
     return DeltaSample{-wo, passed / (1.0f - p), 1.0f};
   }
+  std::optional<DeltaTransmission> deltaTransmission(const Vec3& wo, const Vec2& uv) const override {
+    return DeltaTransmission{-wo, (1.0f - slabReflectance(wo)) * transmittance_->eval(uv), true};
+  }
   float deltaProbability(const Vec3&, const Vec2&) const override { return 1.0f; }
 
   LobeMixture mixture(const Vec3&, const Vec2&) const override { return {}; }

@@ -45,12 +45,12 @@ GuidedDensity guidedDensity(const PackedRecord& record) {
 
 Rgb emissionLeftToNee(const RenderScene& scene, const Receiver& receiver, const Ray& ray) {
   const float cosine = receiver.cosine(ray.direction);
-  const std::optional<SurfaceHit> hit = scene.tracer.trace(ray);
-  if (!hit)
-    return scene.lights.environmentRadiance(ray.direction) *
-           (1 - directFraction(cosine, scene.lights.environmentPdf(ray.direction)));
-  if (!hit->emitter) return Rgb::Zero();
-  return emittedRadiance(*hit) * (1 - directFraction(cosine, scene.lights.pdf(receiver.point.position, *hit)));
+  const TransmittedRay end = scene.follow(ray, scene.shadowSurfaces);
+  const auto left = [&](float emitterPdf) { return Rgb(end.transmittance * (1 - directFraction(cosine, emitterPdf))); };
+  if (!end.hit)
+    return left(scene.lights.environmentPdf(ray.direction)) * scene.lights.environmentRadiance(end.last.direction);
+  if (!end.hit->emitter || end.bent) return Rgb::Zero();
+  return left(scene.lights.pdf(receiver.point.position, *end.hit)) * emittedRadiance(*end.hit);
 }
 
 std::vector<Receiver> receiversOfPaths(const RenderScene& scene, const RayCamera& camera, int count,
@@ -59,7 +59,7 @@ std::vector<Receiver> receiversOfPaths(const RenderScene& scene, const RayCamera
   PathStatistics statistics;
   const PathOptions options{kReceiverDepth, kReceiverDepth};
   for (int i = 0; i < count; ++i) {
-    Rng rng(seed, 0, i);
+    Sampler rng(seed, 0, i);
     const Vec2 pixel = rng.uniform2();
     const Ray ray = camera.sample(static_cast<int>(pixel.x() * static_cast<float>(camera.width())),
                                   static_cast<int>(pixel.y() * static_cast<float>(camera.height())), rng);
@@ -171,7 +171,7 @@ class DirectionSampler {
   const ServedDensity& near_;
   const IncidentRadianceOptions& options_;
   PathStatistics statistics_;
-  Rng rng_;
+  Sampler rng_;
   std::vector<IncidentRadiance::Sample> samples_;
 };
 

@@ -57,7 +57,7 @@ std::vector<SurfaceHit> verticesOfPaths(const RenderScene& scene, const RayCamer
   PathStatistics statistics;
   const PathOptions options;
   for (int i = 0; i < kPathsPerVertex * count && static_cast<int>(chosen.size()) < count; ++i) {
-    Rng rng(kVertexSeed, 0, i);
+    Sampler rng(kVertexSeed, 0, i);
     const Vec2 pixel = rng.uniform2();
     const Ray ray = camera.sample(static_cast<int>(pixel.x() * static_cast<float>(camera.width())),
                                   static_cast<int>(pixel.y() * static_cast<float>(camera.height())), rng);
@@ -177,7 +177,7 @@ class DirectionSampler {
   const Bench& bench_;
   const SurfaceHit& hit_;
   GuidedSampler::Vertex guided_, product_;
-  Rng rng_;
+  Sampler rng_;
   PathStatistics statistics_;
   int each_ = 0;
   std::vector<IncidentRadiance::Sample> samples_;

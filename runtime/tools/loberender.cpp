@@ -121,6 +121,16 @@ void declare(CLI::App& app, Options& options) {
                                                                          {"adjoint", RussianRoulette::adjoint}})
               .description("{throughput,adjoint}"))
       ->default_str("adjoint");
+  app.add_option("--shadow-surfaces", job.shadowSurfaces,
+                 "Number of glass, mask or null surfaces that next-event estimation sees through (0: none)")
+      ->check(CLI::Range(0, 1000))
+      ->capture_default_str();
+  app.add_option("--sampler", job.sampling, "Random numbers of a pixel: Owen-scrambled Sobol' points, or independent")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, PixelSampling>{{"sobol", PixelSampling::sobol},
+                                                                       {"independent", PixelSampling::independent}})
+              .description("{sobol,independent}"))
+      ->default_str("sobol");
   app.add_option("--seed", job.seed, "Random seed")
       ->check(CLI::Range(std::uint64_t{0}, kMaxSeed))
       ->capture_default_str();

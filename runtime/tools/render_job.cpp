@@ -289,7 +289,7 @@ std::unique_ptr<Integrator> makeIntegrator(const RenderJob& job, const RenderSce
 }
 
 RenderOptions renderOptions(const RenderJob& job, double trained) {
-  RenderOptions options{job.seed, job.samples, std::nullopt, job.sampleOffset};
+  RenderOptions options{job.seed, job.samples, std::nullopt, job.sampling, job.sampleOffset};
   if (job.seconds) options.seconds = std::max(*job.seconds - trained, 1e-3);
   return options;
 }
@@ -376,7 +376,7 @@ void run(const RenderJob& job) {
   if (job.integrator == IntegratorKind::product)
     guiding.caches.emplace(job.cacheFolder, lobeRequests(scene), lobefitCommand(job), job.reduction);
   const Stopwatch building;
-  const RenderScene renderScene(scene);
+  const RenderScene renderScene(scene, job.shadowSurfaces);
   load.building = building.seconds();
   load.embree = renderScene.tracer.buildSeconds();
   const RayCamera camera(scene.camera, scene.filter);

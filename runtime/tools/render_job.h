@@ -10,6 +10,7 @@
 
 #include "runtime/image/image.h"
 #include "runtime/render/integrators/path_loop.h"
+#include "runtime/render/integrators/renderer.h"
 #include "runtime/render/training/training.h"
 
 namespace lobe {
@@ -29,6 +30,8 @@ struct RenderJob {
   std::optional<double> seconds;  ///< for training and rendering together
   std::optional<std::pair<int, int>> size;
   std::optional<int> maxDepth;  ///< in segments; empty: max_depth of the scene, or no limit
+  int shadowSurfaces = RenderScene::kDefaultShadowSurfaces;
+  PixelSampling sampling = PixelSampling::sobol;
   RussianRoulette russianRoulette = RussianRoulette::adjoint;
   std::uint64_t seed = 1;
   float reduction = 0;  ///< maximum cost of merging the mixtures of both factors (Runnalls 2007); 0: no merging

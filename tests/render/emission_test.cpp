@@ -29,7 +29,7 @@ Rgb seenOnFloor(const std::string& radiance) {
   PathStatistics statistics;
   constexpr int kSamples = 1 << 18;
   for (int i = 0; i < kSamples; ++i) {
-    Rng rng(11, 0, i);
+    Sampler rng(11, 0, i);
     sum += integrator.radiance(ray, rng, statistics).cast<double>();
   }
   return (sum / kSamples).cast<float>();

@@ -9,12 +9,12 @@ using namespace lobe::test;
 
 namespace {
 
-Vec3 randomDirection(Rng& rng) {
+Vec3 randomDirection(Sampler& rng) {
   return squareToSphere(rng.uniform2());
 }
 
 // A random direction in the hemisphere around `side`.
-Vec3 randomDirection(Rng& rng, const Vec3& side) {
+Vec3 randomDirection(Sampler& rng, const Vec3& side) {
   const Vec3 d = randomDirection(rng);
   return d.dot(side) < 0 ? Vec3(-d) : d;
 }
@@ -33,7 +33,7 @@ struct Leaks {
 Leaks leaksOf(const Scene& scene, const Vec3& centre, float size) {
   const RayTracer tracer(scene);
   Leaks leaks;
-  Rng rng(3);
+  Sampler rng(3);
   for (int i = 0; i < 20000; ++i) {
     const Vec3 from = centre + 3 * size * randomDirection(rng);
     const Vec3 to = centre + 0.4f * size * randomDirection(rng);
@@ -102,7 +102,7 @@ TEST_CASE("render: light does not leak through a floor from just below it") {
   addEmitter(scene, rectangle({-1, -0.01f, -1}, {0, 0, 2}, {2, 0, 0}), 1);  // just below the floor, shining up
   const RenderScene ready(scene);
   const SurfaceHit floor = hitOf(scene, {Vec3(0.3f, 1, 0.2f), Vec3(0, -1, 0)});
-  Rng rng(1);
+  Sampler rng(1);
   for (int i = 0; i < 1000; ++i) {
     const float choice = rng.uniform();
     const auto light = ready.lights.sample(Vec3(0.3f, 0.5f, 0.2f), choice, rng.uniform2());
@@ -225,7 +225,7 @@ TEST_CASE("render: an instance is equivalent to the transformed mesh") {
   addShape(instanced, Instance{1, toWorld}, -1);
   const RayTracer a(direct), b(instanced);
   CHECK((a.bounds().diagonal() - b.bounds().diagonal()).norm() < 2.0f);  // instances use the bounding box of a box
-  Rng rng(8);
+  Sampler rng(8);
   int hits = 0, differing = 0;
   for (int i = 0; i < 5000; ++i) {
     const Vec3 from = 6 * randomDirection(rng);
@@ -251,7 +251,7 @@ TEST_CASE("render: rays do not leak out of a spherical mesh") {
   Scene scene;
   addShape(scene, sphereMesh({0, 0, 0}, 1.0f, 40), -1);
   const RayTracer tracer(scene);
-  Rng rng(5);
+  Sampler rng(5);
   int missed = 0;
   for (int i = 0; i < 100000; ++i) missed += !tracer.occluded({Vec3(0.1f, 0.2f, 0.3f), randomDirection(rng)});
   CHECK(missed == 0);
@@ -304,7 +304,7 @@ TEST_CASE("render: an orthographic camera covers −1 to 1 of its frame with par
   CHECK((rays.rayThrough({100, 50}).origin - Vec3(0, 0, 5)).norm() < 1e-5f);
   CHECK((rays.rayThrough({0, 50}).origin - Vec3(3, 0, 5)).norm() < 1e-5f);
   CHECK((rays.rayThrough({200, 0}).origin - Vec3(-3, 1.5f, 5)).norm() < 1e-5f);
-  Rng rng(1);
+  Sampler rng(1);
   for (int x = 0; x < 200; x += 7) CHECK((rays.sample(x, x / 2, rng).direction - Vec3::UnitZ()).norm() < 1e-6f);
 }
 
@@ -323,7 +323,7 @@ TEST_CASE("render: crop and shift translate the film") {
   CHECK(cropped.width() == 64);
   CHECK(cropped.height() == 48);
   CHECK(equal(cropped.rayThrough(point, lens), whole.rayThrough(point + Vec2(30, 20), lens)));
-  Rng one(3), other(3);
+  Sampler one(3), other(3);
   CHECK(equal(cropped.sample(5, 6, one), whole.sample(35, 26, other)));
   camera.shift = Vec2(0.25f, -0.1f);
   CHECK(equal(RayCamera(camera, {}).rayThrough(point, lens), whole.rayThrough(point + Vec2(80, 10), lens)));
@@ -347,7 +347,7 @@ TEST_CASE("render: a thin lens is sharp at the focus distance and is sampled uni
   const Vec3 sharp = onFocus(rays.rayThrough(point));
   camera.kind = Camera::Kind::perspective;
   CHECK((onFocus(RayCamera(camera, {}).rayThrough(point)) - sharp).norm() < 1e-5f);
-  Rng rng(5);
+  Sampler rng(5);
   for (int i = 0; i < 100; ++i)
     CHECK((onFocus(rays.rayThrough(point, squareToDisk(rng.uniform2()))) - sharp).norm() < 1e-5f);
   const auto draw = [&]() -> std::optional<Eigen::Vector2d> {
@@ -364,7 +364,7 @@ TEST_CASE("render: a thin lens is sharp at the focus distance and is sampled uni
 TEST_CASE("render: samples of filters have the moments of the filters") {
   const auto moments = [](const PixelFilter& filter) {
     const FilterSampler sampler(filter);
-    Rng rng(2);
+    Sampler rng(2);
     Moments first, second;
     float widest = 0;
     for (int i = 0; i < 200000; ++i) {

@@ -193,7 +193,7 @@ const Ray kLookIntoRoom{Vec3(-1.5f, 1.5f, -1.5f), Vec3(1.8f, -1.0f, 1.4f).normal
 class Naive : public Integrator {
  public:
   explicit Naive(const RenderScene& scene) : scene_(scene) {}
-  Rgb radiance(const Ray& first, Rng& rng, PathStatistics&) const override {
+  Rgb radiance(const Ray& first, Sampler& rng, PathStatistics&) const override {
     Rgb sum = Rgb::Zero(), throughput = Rgb::Ones();
     Ray ray = first;
     while (const auto hit = scene_.tracer.trace(ray)) {
@@ -209,7 +209,7 @@ class Naive : public Integrator {
   }
 
  private:
-  static std::optional<std::pair<Vec3, Rgb>> next(const SurfaceHit& hit, Rng& rng) {
+  static std::optional<std::pair<Vec3, Rgb>> next(const SurfaceHit& hit, Sampler& rng) {
     const float fraction = hit.bsdf->deltaProbability(hit.wo, hit.uv);
     if (rng.uniform() < fraction) {
       const auto s = hit.bsdf->sampleDelta(hit.wo, hit.uv, rng.uniform());
@@ -229,7 +229,7 @@ struct UniformSampler {
   class Vertex {
    public:
     Vertex(const UniformSampler& sampler, const SurfaceHit& hit) : density_(0.5f * kInvPi * sampler.fault), hit_(hit) {}
-    std::optional<BsdfSample> sample(Rng& rng, PathStatistics&) const {
+    std::optional<BsdfSample> sample(Sampler& rng, PathStatistics&) const {
       Vec3 wi = squareToSphere(rng.uniform2());
       if (wi.z() * hit_.wo.z() < 0) wi.z() = -wi.z();
       return BsdfSample{wi, hit_.bsdf->eval(hit_.wo, wi, hit_.uv), density_};
@@ -254,7 +254,7 @@ class UniformIntegrator : public Integrator {
       : scene_(scene), sampler_{fault} {
     options_.russianRoulette = russianRoulette;
   }
-  Rgb radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const override {
+  Rgb radiance(const Ray& ray, Sampler& rng, PathStatistics& statistics) const override {
     return PathLoop(scene_, options_, sampler_).radiance(ray, rng, statistics);
   }
 
@@ -284,7 +284,7 @@ TEST_CASE("render: adjoint-driven Russian roulette and splitting is unbiased for
   const UniformIntegrator window(ready, 1.0f, RussianRoulette::adjoint);
   CHECK(deviation(path, estimate(window, kLookIntoRoom, 100000, 9)) < kMaxDeviation);
   PathStatistics plain, split;
-  Rng rng(3);
+  Sampler rng(3);
   for (int i = 0; i < 1000; ++i) {
     UniformIntegrator(ready, 1.0f).radiance(kLookIntoRoom, rng, plain);
     window.radiance(kLookIntoRoom, rng, split);
@@ -319,7 +319,7 @@ TEST_CASE("render: an image depends on the seed but not on threads or waves") {
   Film byHand(camera.width, camera.height);
   PathStatistics statistics;
   for (int s = 0; s < 7; ++s) {
-    Rng rng(5, 11 * camera.width + 13, s);
+    Sampler rng(5, 11 * camera.width + 13, s);
     const Ray ray = pinhole.sample(13, 11, rng);
     byHand.add(13, 11, integrator.radiance(ray, rng, statistics));
   }

@@ -27,7 +27,7 @@ Picture pictureOf(const Scene& scene) {
   for (int pixel = 0; pixel < kSize * kSize; ++pixel) {
     Rgb sum = Rgb::Zero();
     for (int s = 0; s < kSamples; ++s) {
-      Rng rng(5, pixel, s);
+      Sampler rng(5, pixel, s);
       const Ray ray = camera.sample(pixel % kSize, pixel / kSize, rng);
       sum += integrator.radiance(ray, rng, statistics);
     }

@@ -24,7 +24,7 @@ std::vector<Moments> photonFlux(const RenderScene& scene, const GuidedSampler& i
                                 std::uint64_t seed, int bins, const Binning& binOf) {
   std::vector<Moments> moments(bins);
   for (int i = 0; i < count; ++i) {
-    Rng rng(seed, 0, i);
+    Sampler rng(seed, 0, i);
     const float choice = rng.uniform();
     const Vec2 u1 = rng.uniform2();
     PhotonResult result;
@@ -65,7 +65,7 @@ std::vector<Moments> pathFlux(const RenderScene& scene, const GuidedSampler& sam
   std::vector<Moments> moments(Patch::kRings * Patch::kSectors);
   const ImportonWishes wishes{false, false, true};
   for (int i = 0; i < count; ++i) {
-    Rng rng(seed, 0, i);
+    Sampler rng(seed, 0, i);
     const Vec2 u = patch.half * (2 * rng.uniform2() - Vec2::Ones());
     ImportonResult result;
     ImportonWalk(scene, sampler, wishes, rng, result).run({Vec3(u.x(), 0.01f, u.y()), -Vec3::UnitY()}, 0);
@@ -213,7 +213,7 @@ TEST_CASE("training: all estimators agree with the closed form in an integrating
   // Every vertex of every path is an estimate, zero if it has no sample. Only different paths are independent.
   Moments excess;
   for (int i = 0; i < 50000; ++i) {
-    Rng rng(2, 0, i);
+    Sampler rng(2, 0, i);
     ImportonResult result;
     ImportonWalk(ready, unguided.sampler, {false, false, true}, rng, result).run({Vec3::Zero(), Vec3::UnitX()}, 0);
     double sum = 0;

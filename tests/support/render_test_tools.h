@@ -141,7 +141,7 @@ inline Moments estimate(const Integrator& integrator, const Ray& ray, int n, std
   Moments moments;
   PathStatistics statistics;
   for (int i = 0; i < n; ++i) {
-    Rng rng(seed, 0, i);
+    Sampler rng(seed, 0, i);
     moments.add(integrator.radiance(ray, rng, statistics).y());
   }
   return moments;

@@ -28,7 +28,7 @@ struct WrongSampler {
   class Vertex {
    public:
     Vertex(const WrongSampler& sampler, const SurfaceHit& hit) : vertex_(sampler.right, hit) {}
-    std::optional<BsdfSample> sample(Rng& rng, PathStatistics& statistics) const {
+    std::optional<BsdfSample> sample(Sampler& rng, PathStatistics& statistics) const {
       auto sample = vertex_.sample(rng, statistics);
       if (sample && vertex_.distribution().hasRecord()) sample->pdf *= 1.1f;
       return sample;
@@ -44,7 +44,7 @@ struct WrongSampler {
 class WrongIntegrator : public Integrator {
  public:
   explicit WrongIntegrator(const Studio& studio) : scene_(studio.renderScene()), sampler_{studio.productSampler()} {}
-  Rgb radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const override {
+  Rgb radiance(const Ray& ray, Sampler& rng, PathStatistics& statistics) const override {
     return PathLoop(scene_, options_, sampler_).radiance(ray, rng, statistics);
   }
 

@@ -5,7 +5,7 @@
 // softer images than with splatting.
 
 #include "runtime/core/distribution.h"
-#include "runtime/core/random.h"
+#include "runtime/core/sampler.h"
 #include "runtime/render/geometry/ray.h"
 #include "scenes/scene.h"
 
@@ -40,7 +40,7 @@ class RayCamera {
   Ray rayThrough(const Vec2& point, const Vec2& lens = Vec2::Zero()) const;
 
   /// A random ray for the pixel in column x and row y, from a random point on the lens.
-  Ray sample(int x, int y, Rng& rng) const;
+  Ray sample(int x, int y, Sampler& rng) const;
 
  private:
   Ray clipped(const Vec3& origin, const Vec3& direction) const;

@@ -250,6 +250,12 @@ std::optional<DeltaSample> sampleDelta(const SurfaceHit& hit, float choice) {
   return sample;
 }
 
+std::optional<DeltaTransmission> deltaTransmission(const SurfaceHit& hit) {
+  std::optional<DeltaTransmission> transmission = hit.bsdf->deltaTransmission(hit.wo, hit.uv);
+  if (transmission) transmission->weight *= terminatorShadowing(hit, transmission->wi);
+  return transmission;
+}
+
 Rgb emittedRadiance(const SurfaceHit& hit) {
   if (!hit.emitter || hit.normal.dot(hit.woWorld) <= 0.0f) return Rgb::Zero();
   return hit.emitter->radiance->eval(hit.uv);

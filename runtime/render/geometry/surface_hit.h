@@ -58,6 +58,7 @@ SurfaceHit makeSurfaceHit(const Scene& scene, const Ray& ray, const Hit& hit);
 Rgb evalBsdf(const SurfaceHit& hit, const Vec3& wi);
 std::optional<BsdfSample> sampleBsdf(const SurfaceHit& hit, float choice, const Vec2& u);
 std::optional<DeltaSample> sampleDelta(const SurfaceHit& hit, float choice);
+std::optional<DeltaTransmission> deltaTransmission(const SurfaceHit& hit);
 
 /// The radiance that the point emits towards the origin of the ray; black on the back side.
 Rgb emittedRadiance(const SurfaceHit& hit);

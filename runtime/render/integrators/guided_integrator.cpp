@@ -45,9 +45,9 @@ GuidedSampler::Vertex::Vertex(const GuidedSampler& sampler, const SurfaceHit& hi
                          sampler.caches_);
 }
 
-std::optional<BsdfSample> GuidedSampler::Vertex::sample(Rng& rng, PathStatistics& statistics) const {
-  float choice = rng.uniform();
-  const Vec2 u = rng.uniform2();
+std::optional<BsdfSample> GuidedSampler::Vertex::sample(Sampler& rng, PathStatistics& statistics) const {
+  float choice = rng.stratified();
+  const Vec2 u = rng.stratified2();
   const Strategy strategy = distribution_.choose(choice);
   statistics.count(strategy);
   statistics.count(distribution_.decision());
@@ -79,7 +79,7 @@ std::optional<float> GuidedSampler::Vertex::reflectedRadiance() const {
   return distribution_.reflectedRadiance(albedo);
 }
 
-Rgb GuidedIntegrator::radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const {
+Rgb GuidedIntegrator::radiance(const Ray& ray, Sampler& rng, PathStatistics& statistics) const {
   return PathLoop(scene_, options_, sampler_).radiance(ray, rng, statistics);
 }
 

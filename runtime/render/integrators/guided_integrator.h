@@ -25,7 +25,7 @@ class GuidedSampler {
     Vertex(const Vertex&) = delete;
     Vertex& operator=(const Vertex&) = delete;
 
-    std::optional<BsdfSample> sample(Rng& rng, PathStatistics& statistics) const;
+    std::optional<BsdfSample> sample(Sampler& rng, PathStatistics& statistics) const;
     float pdf(const Vec3& wi) const;
     std::optional<float> reflectedRadiance() const;
     const SurfaceDistribution& distribution() const { return distribution_; }
@@ -47,7 +47,7 @@ class GuidedIntegrator : public Integrator {
   /// Scene and sampler must outlive it.
   GuidedIntegrator(const RenderScene& scene, const PathOptions& options, const GuidedSampler& sampler)
       : scene_(scene), options_(options), sampler_(sampler) {}
-  Rgb radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const override;
+  Rgb radiance(const Ray& ray, Sampler& rng, PathStatistics& statistics) const override;
 
  private:
   const RenderScene& scene_;

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "lobe/surface_distribution.h"
-#include "runtime/core/random.h"
+#include "runtime/core/sampler.h"
 #include "runtime/render/geometry/ray.h"
 
 namespace lobe {
@@ -44,7 +44,7 @@ class Integrator {
  public:
   virtual ~Integrator() = default;
   /// An unbiased estimate of the radiance that arrives along the ray. Called concurrently from many threads.
-  virtual Rgb radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const = 0;
+  virtual Rgb radiance(const Ray& ray, Sampler& rng, PathStatistics& statistics) const = 0;
 };
 
 }  // namespace lobe

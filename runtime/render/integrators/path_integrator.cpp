@@ -2,7 +2,7 @@
 
 namespace lobe {
 
-Rgb PathIntegrator::radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const {
+Rgb PathIntegrator::radiance(const Ray& ray, Sampler& rng, PathStatistics& statistics) const {
   const BsdfSampler sampler;
   return PathLoop(scene_, options_, sampler).radiance(ray, rng, statistics);
 }

@@ -10,10 +10,10 @@ struct BsdfSampler {
   class Vertex {
    public:
     Vertex(const BsdfSampler&, const SurfaceHit& hit) : hit_(hit) {}
-    std::optional<BsdfSample> sample(Rng& rng, PathStatistics& statistics) const {
+    std::optional<BsdfSample> sample(Sampler& rng, PathStatistics& statistics) const {
       statistics.count(Strategy::bsdf);
-      const float choice = rng.uniform();
-      return sampleBsdf(hit_, choice, rng.uniform2());
+      const float choice = rng.stratified();
+      return sampleBsdf(hit_, choice, rng.stratified2());
     }
     float pdf(const Vec3& wi) const { return hit_.bsdf->pdf(hit_.wo, wi, hit_.uv); }
 
@@ -28,7 +28,7 @@ class PathIntegrator : public Integrator {
  public:
   /// The scene must outlive it.
   PathIntegrator(const RenderScene& scene, const PathOptions& options) : scene_(scene), options_(options) {}
-  Rgb radiance(const Ray& ray, Rng& rng, PathStatistics& statistics) const override;
+  Rgb radiance(const Ray& ray, Sampler& rng, PathStatistics& statistics) const override;
 
  private:
   const RenderScene& scene_;

@@ -1,17 +1,17 @@
 #pragma once
-// The path tracing loop for any sampler of directions: emission, next-event estimation with multiple importance
-// sampling (power heuristic), delta components of materials, Russian roulette and splitting. The sampler only samples
-// the non-delta component.
+// The path tracing loop for any guide, which samples directions: emission, next-event estimation with multiple
+// importance sampling (power heuristic), delta components of materials, Russian roulette and splitting. The guide only
+// samples the non-delta component.
 //
-// A sampler is a type with a nested class Vertex, which the loop constructs where a path scatters at a surface that is
+// A guide is a type with a nested class Vertex, which the loop constructs where a path scatters at a surface that is
 // not purely specular:
 //
-//   struct Sampler {
+//   struct Guide {
 //     class Vertex {
-//       Vertex(const Sampler& sampler, const SurfaceHit& hit);
+//       Vertex(const Guide& guide, const SurfaceHit& hit);
 //       // Samples a direction, with its BSDF value and its density pdf(wi); nullopt: a sample of value zero.
 //       // Counts the strategy that was chosen.
-//       std::optional<BsdfSample> sample(Rng& rng, PathStatistics& statistics) const;
+//       std::optional<BsdfSample> sample(Sampler& rng, PathStatistics& statistics) const;
 //       // The density of sample over solid angle.
 //       float pdf(const Vec3& wi) const;
 //       // Estimate of the radiance reflected towards wo, luminance, in units that all vertices share; nullopt:
@@ -58,19 +58,13 @@ inline constexpr float kLeastSurvival = 0.2f;
 /// Upper bound of the branches that splitting makes of one camera path.
 inline constexpr int kMaxBranches = 16;
 
-/// The multiple importance weight of a technique with density `own` against one with density `other` (power heuristic).
-inline float misWeight(float own, float other) {
-  const float ratio = other / own;
-  return 1.0f / (1.0f + ratio * ratio);
-}
-
-template <class Sampler>
+template <class Guide>
 class PathLoop {
  public:
-  PathLoop(const RenderScene& scene, const PathOptions& options, const Sampler& sampler)
+  PathLoop(const RenderScene& scene, const PathOptions& options, const Guide& sampler)
       : scene_(scene), options_(options), sampler_(sampler) {}
 
-  Rgb radiance(const Ray& cameraRay, Rng& rng, PathStatistics& statistics) const {
+  Rgb radiance(const Ray& cameraRay, Sampler& rng, PathStatistics& statistics) const {
     Path path{cameraRay, rng, statistics};
     ++statistics.paths;
     follow(path);
@@ -80,14 +74,13 @@ class PathLoop {
  private:
   struct Path {
     Ray ray;
-    Rng& rng;
+    Sampler& rng;
     PathStatistics& statistics;
     Rgb radiance = Rgb::Zero();
     Rgb throughput = Rgb::Ones();
-    float pdf = 0;  // of the last direction; 0 after the camera or a delta component, where NEE does not apply
+    EmissionWeight emissionWeight = {};
     Rgb expected = Rgb::Ones();  // product of the albedos: the expected throughput, whatever was sampled
     float eta2 = 1;              // scaling of radiance by refraction so far, which Russian roulette undoes
-    Vec3 previous = Vec3::Zero();
     int depth = 0;
     float reference = 0;  // expected contribution at the first vertex with an estimate; 0: none yet
     int branches = 1;     // into which the camera path has been split so far
@@ -105,11 +98,12 @@ class PathLoop {
     const std::optional<SurfaceHit> hit = dark ? firstVisible(path) : scene_.tracer.trace(path.ray);
     if (!hit) {
       if (dark) return false;
-      const float light = path.pdf > 0.0f ? scene_.lights.environmentPdf(path.ray.direction) : 0.0f;
-      addEmission(path, scene_.lights.environmentRadiance(path.ray.direction), light);
+      path.radiance += path.throughput * scene_.lights.environmentRadiance(path.ray.direction) *
+                       path.emissionWeight.ofEnvironment(scene_.lights);
       return false;
     }
-    if (hit->emitter && !dark) addEmission(path, emittedRadiance(*hit), path.pdf > 0.0f ? lightPdf(path, *hit) : 0.0f);
+    if (hit->emitter && !dark)
+      path.radiance += path.throughput * emittedRadiance(*hit) * path.emissionWeight.ofSurface(scene_.lights, *hit);
     if (!hit->bsdf || path.depth >= options_.maxDepth || !sidesAgree(*hit, hit->woWorld, hit->wo)) return false;
     return scatter(path, *hit);
   }
@@ -123,13 +117,6 @@ class PathLoop {
       path.ray.origin = offsetPoint(*hit, path.ray.direction);
       ++path.statistics.segments;
     }
-  }
-
-  float lightPdf(const Path& path, const SurfaceHit& hit) const { return scene_.lights.pdf(path.previous, hit); }
-
-  void addEmission(Path& path, const Rgb& emitted, float lightDensity) const {
-    const float weight = path.pdf > 0.0f ? misWeight(path.pdf, lightDensity) : 1.0f;
-    path.radiance += path.throughput * emitted * weight;
   }
 
   // Russian roulette by throughput; divides the throughput by the survival probability.
@@ -148,7 +135,7 @@ class PathLoop {
   }
 
   // Number of branches that continue from the vertex; 0 if the path ends here.
-  int continuations(Path& path, const typename Sampler::Vertex& vertex) const {
+  int continuations(Path& path, const typename Guide::Vertex& vertex) const {
     const std::optional<float> leaving =
         options_.russianRoulette == RussianRoulette::adjoint ? vertex.reflectedRadiance() : std::nullopt;
     const float expected = leaving ? luminance(path.throughput) * *leaving : 0.0f;
@@ -167,7 +154,7 @@ class PathLoop {
   bool scatter(Path& path, const SurfaceHit& hit) const {
     const float deltaFraction = hit.bsdf->deltaProbability(hit.wo, hit.uv);
     if (deltaFraction >= 1.0f) return survivesByThroughput(path) && scatterDelta(path, hit, deltaFraction);
-    const typename Sampler::Vertex vertex(sampler_, hit);
+    const typename Guide::Vertex vertex(sampler_, hit);
     const int copies = continuations(path, vertex);
     if (copies == 0) return false;
     path.throughput /= static_cast<float>(copies);
@@ -181,41 +168,42 @@ class PathLoop {
     return scatterAt(path, hit, vertex, deltaFraction);
   }
 
-  bool scatterAt(Path& path, const SurfaceHit& hit, const typename Sampler::Vertex& vertex, float deltaFraction) const {
+  bool scatterAt(Path& path, const SurfaceHit& hit, const typename Guide::Vertex& vertex, float deltaFraction) const {
     addDirectLight(path, hit, vertex, 1.0f - deltaFraction);
     if (deltaFraction <= 0.0f || path.rng.uniform() >= deltaFraction)
       return scatterSmooth(path, hit, vertex, 1.0f - deltaFraction);
     return scatterDelta(path, hit, deltaFraction);
   }
 
-  void addDirectLight(Path& path, const SurfaceHit& hit, const typename Sampler::Vertex& vertex, float fraction) const {
-    const float choice = path.rng.uniform();
-    const std::optional<LightSample> light = scene_.lights.sample(hit.position, choice, path.rng.uniform2());
+  void addDirectLight(Path& path, const SurfaceHit& hit, const typename Guide::Vertex& vertex, float fraction) const {
+    const float choice = path.rng.stratified();
+    const std::optional<LightSample> light = scene_.lights.sample(hit.position, choice, path.rng.stratified2());
     if (!light) return;
     const Vec3 wi = hit.frame.toLocal(light->wi);
     if (!sidesAgree(hit, light->wi, wi)) return;
-    const Rgb value = evalBsdf(hit, wi) * light->radiance;
-    if (!(value.maxCoeff() > 0.0f)) return;
-    ++path.statistics.shadowRays;
-    if (!scene_.visible(hit, *light)) return;
+    const Rgb f = evalBsdf(hit, wi);
+    if (!(f.maxCoeff() > 0.0f)) return;
+    const Rgb arriving = scene_.arriving(hit, *light, options_.maxDepth - path.depth - 1, path.statistics.shadowRays);
+    if (!(arriving.maxCoeff() > 0.0f)) return;
     const float weight = light->delta ? 1.0f : misWeight(light->pdf, fraction * vertex.pdf(wi));
-    path.radiance += path.throughput * value * (std::abs(wi.z()) * weight / light->pdf);
+    path.radiance += path.throughput * f * arriving * (std::abs(wi.z()) * weight / light->pdf);
   }
 
-  bool scatterSmooth(Path& path, const SurfaceHit& hit, const typename Sampler::Vertex& vertex, float fraction) const {
+  bool scatterSmooth(Path& path, const SurfaceHit& hit, const typename Guide::Vertex& vertex, float fraction) const {
     const std::optional<BsdfSample> sample = vertex.sample(path.rng, path.statistics);
     if (!sample) return false;
     const float pdf = fraction * sample->pdf;
-    path.pdf = pdf;
     path.eta2 *= sample->eta * sample->eta;
-    return continueAlong(path, hit, sample->wi, sample->f * (std::abs(sample->wi.z()) / pdf));
+    if (!continueAlong(path, hit, sample->wi, sample->f * (std::abs(sample->wi.z()) / pdf))) return false;
+    path.emissionWeight.scattered(hit.position, path.ray.direction, pdf);
+    return true;
   }
 
   bool scatterDelta(Path& path, const SurfaceHit& hit, float fraction) const {
     path.statistics.countDelta();
     const std::optional<DeltaSample> sample = sampleDelta(hit, path.rng.uniform());
     if (!sample) return false;
-    path.pdf = 0.0f;
+    path.emissionWeight.passed(hit, sample->wi, scene_.shadowSurfaces);
     path.eta2 *= sample->eta * sample->eta;
     return continueAlong(path, hit, sample->wi, sample->weight / fraction);
   }
@@ -225,14 +213,13 @@ class PathLoop {
     if (!sidesAgree(hit, direction, wi)) return false;
     path.throughput *= weight;
     path.expected *= hit.bsdf->albedo(hit.wo, hit.uv);
-    path.previous = hit.position;
     path.ray = spawnRay(hit, direction);
     return path.throughput.maxCoeff() > 0.0f;
   }
 
   const RenderScene& scene_;
   const PathOptions& options_;
-  const Sampler& sampler_;
+  const Guide& sampler_;
 };
 
 }  // namespace lobe

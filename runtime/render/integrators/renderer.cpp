@@ -23,8 +23,8 @@ struct Wave {
 
 class WaveRenderer {
  public:
-  WaveRenderer(const RayCamera& camera, const Integrator& integrator, Film& film, std::uint64_t seed)
-      : camera_(camera), integrator_(integrator), film_(film), seed_(seed) {
+  WaveRenderer(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options)
+      : camera_(camera), integrator_(integrator), film_(film), seed_(options.seed), sampling_(options.sampling) {
     columns_ = (film.width() + kTileSize - 1) / kTileSize;
     tiles_ = columns_ * ((film.height() + kTileSize - 1) / kTileSize);
   }
@@ -56,7 +56,8 @@ class WaveRenderer {
   void renderPixel(int x, int y, const Wave& wave, PathStatistics& statistics) const {
     const auto pixel = static_cast<std::uint64_t>(y) * film_.width() + x;
     for (int s = wave.first; s < wave.last; ++s) {
-      Rng rng(seed_, pixel, s);
+      Sampler rng = sampling_ == PixelSampling::sobol ? Sampler::stratified(seed_, pixel, static_cast<std::uint32_t>(s))
+                                                      : Sampler(seed_, pixel, static_cast<std::uint64_t>(s));
       const Ray ray = camera_.sample(x, y, rng);
       film_.add(x, y, integrator_.radiance(ray, rng, statistics));
     }
@@ -66,6 +67,7 @@ class WaveRenderer {
   const Integrator& integrator_;
   Film& film_;
   std::uint64_t seed_;
+  PixelSampling sampling_;
   int columns_, tiles_;
 };
 
@@ -110,7 +112,7 @@ void RenderOptions::validate() const {
 RenderResult render(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options,
                     const AfterWave& afterWave) {
   options.validate();
-  const WaveRenderer renderer(camera, integrator, film, options.seed);
+  const WaveRenderer renderer(camera, integrator, film, options);
   const WavePlan plan(options);
   RenderResult result{{}, {0.0, 0}};
   RenderProgress& progress = result.total;

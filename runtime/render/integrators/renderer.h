@@ -11,12 +11,17 @@
 
 namespace lobe {
 
+/// Where the random numbers of a pixel's samples come from: an Owen-scrambled Sobol' sequence for the film and the
+/// first vertices (Sampler::stratified), or independent numbers.
+enum class PixelSampling { sobol, independent };
+
 /// Exactly one of samples and seconds is set.
 struct RenderOptions {
   std::uint64_t seed = 1;
   std::optional<int> samples;     ///< per pixel: the same image for a seed, on any number of threads
   std::optional<double> seconds;  ///< stops when another wave would not fit; renders at least one sample per pixel
-  int firstSample = 0;            ///< index of the first sample of every pixel; firstSample + samples must fit an int
+  PixelSampling sampling = PixelSampling::sobol;
+  int firstSample = 0;  ///< index of the first sample of every pixel; firstSample + samples must fit an int
 
   /// Throws std::runtime_error that names the field.
   void validate() const;

@@ -1,29 +1,81 @@
 #pragma once
-// A scene with its ray tracer and lights.
+// A scene with its ray tracer and lights, and next-event estimation through surfaces that transmit light without
+// scattering it (panes, masks, refracting interfaces).
 
 #include "runtime/render/geometry/raytracer.h"
 #include "runtime/render/lights/lights.h"
 
 namespace lobe {
 
-struct RenderScene {
-  /// The scene must outlive it.
-  explicit RenderScene(const Scene& s) : scene(s), tracer(s), lights(s, tracer.bounds()) {}
+/// Where a ray ends after it has passed surfaces by delta transmission.
+struct TransmittedRay {
+  Ray last;                       ///< its last segment, with a unit direction
+  std::optional<SurfaceHit> hit;  ///< at the end of the last segment; nullopt: the ray left the scene or reached tfar
+  Rgb transmittance = Rgb::Ones();
+  int surfaces = 0;   ///< passed
+  bool bent = false;  ///< at least one surface changed the direction
+};
 
-  /// Whether a light sample taken at `from.position` is unoccluded.
+struct RenderScene {
+  static constexpr int kDefaultShadowSurfaces = 16;
+
+  /// The scene must outlive it. shadowSurfaces: maximum number of surfaces that next-event estimation passes by delta
+  /// transmission, ≥ 0.
+  explicit RenderScene(const Scene& s, int shadowSurfaces = kDefaultShadowSurfaces);
+
+  /// Follows a ray (unit direction) through up to maxSurfaces surfaces, at each by Bsdf::deltaTransmission. A ray with
+  /// a finite tfar ends at `target`, which it must point to, and at the first surface that would change its direction.
+  TransmittedRay follow(Ray ray, int maxSurfaces, const Vec3* target = nullptr) const;
+
+  /// The radiance of a light sample (for a delta light, its irradiance) that arrives at `from.position` from light.wi:
+  /// zero if it is blocked. It passes up to min(shadowSurfaces, maxSurfaces) surfaces by delta transmission. Light from
+  /// the environment may be refracted, and has the radiance of the direction in which the ray leaves the scene; light
+  /// from other emitters passes only where its direction stays the same. Adds the rays traced to `rays`.
+  Rgb arriving(const SurfacePoint& from, const LightSample& light, int maxSurfaces, std::uint64_t& rays) const;
+
+  /// Whether a light sample taken at `from.position` is unoccluded; surfaces that transmit light occlude, too.
   bool visible(const SurfacePoint& from, const LightSample& light) const;
 
   const Scene& scene;
   RayTracer tracer;
   Lights lights;
+  int shadowSurfaces;  ///< 0 if no material of the scene transmits light
 };
 
-inline bool RenderScene::visible(const SurfacePoint& from, const LightSample& light) const {
-  if (!light.source) return !tracer.occluded(spawnRay(from, light.wi));
-  // Both end points are moved off their surfaces, and the segment ends slightly before the light.
-  const Vec3 origin = offsetPoint(from, light.wi);
-  const Vec3 target = offsetPoint(*light.source, -light.wi);
-  return !tracer.occluded({origin, target - origin, 1.0f - 0x1p-18f});
+/// Multiple importance weight of a technique with density `own` against one with density `other` (power heuristic).
+inline float misWeight(float own, float other) {
+  const float ratio = other / own;
+  return 1.0f / (1.0f + ratio * ratio);
 }
+
+/// What weighs the emission that a path finds against next-event estimation at the last vertex that scattered it:
+/// there, next-event estimation samples the same direction, and follows the same delta transmissions.
+class EmissionWeight {
+ public:
+  /// The path was scattered into a direction (world space) with a density over solid angle.
+  void scattered(const Vec3& position, const Vec3& direction, float pdf) {
+    position_ = position;
+    direction_ = direction;
+    pdf_ = pdf;
+    surfaces_ = 0;
+    bent_ = false;
+  }
+  /// The path went on by a delta component, in a direction that is local in hit.frame.
+  void passed(const SurfaceHit& hit, const Vec3& wi, int shadowSurfaces);
+
+  float ofEnvironment(const Lights& lights) const {
+    return pdf_ > 0 ? misWeight(pdf_, lights.environmentPdf(direction_)) : 1.0f;
+  }
+  /// hit: on an area light.
+  float ofSurface(const Lights& lights, const SurfaceHit& hit) const {
+    return pdf_ > 0 && !bent_ ? misWeight(pdf_, lights.pdf(position_, hit)) : 1.0f;
+  }
+
+ private:
+  Vec3 position_ = Vec3::Zero(), direction_ = Vec3::Zero();
+  float pdf_ = 0;  // 0: next-event estimation does not find the emission
+  int surfaces_ = 0;
+  bool bent_ = false;
+};
 
 }  // namespace lobe

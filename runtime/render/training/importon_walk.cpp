@@ -1,30 +1,6 @@
 #include "runtime/render/training/importon_walk.h"
 
 namespace lobe {
-namespace {
-
-/// How light from the environment reaches a point.
-enum class Passage { blocked, free, refracted };
-
-/// Follows the direction through surfaces that refract, ignoring the change of direction: exact for window panes, and
-/// accurate enough to learn where photons should start.
-Passage passageToEnvironment(const RayTracer& tracer, const SurfacePoint& from, const Vec3& direction) {
-  constexpr int maxSurfaces = 16;
-  Passage passage = Passage::free;
-  Ray ray = spawnRay(from, direction);
-  for (int i = 0; i < maxSurfaces; ++i) {
-    const std::optional<SurfaceHit> hit = tracer.trace(ray);
-    if (!hit) return passage;
-    if (!hit->bsdf || !hit->bsdf->transmits() || hit->bsdf->deltaProbability(hit->wo, hit->uv) <= 0)
-      return Passage::blocked;
-    passage = Passage::refracted;
-    ray = spawnRay(*hit, direction);
-  }
-  return Passage::blocked;
-}
-
-}  // namespace
-
 void ImportonWalk::run(const Ray& cameraRay, std::uint64_t index) {
   recorder_.begin(index);
   result_.importance.beginPath(index);
@@ -43,12 +19,7 @@ bool ImportonWalk::advance() {
     escape();
     return false;
   }
-  if (hit->emitter && pdf_ > 0) {
-    const float weight = misWeight(pdf_, scene_.lights.pdf(previous_, *hit));
-    collect(state_.weight * emittedRadiance(*hit) * weight);
-  } else if (hit->emitter) {
-    collect(state_.weight * emittedRadiance(*hit));
-  }
+  if (hit->emitter) collect(state_.weight * emittedRadiance(*hit) * emissionWeight_.ofSurface(scene_.lights, *hit));
   if (!hit->bsdf || !sidesAgree(*hit, hit->woWorld, hit->wo)) return false;
 
   const float delta = hit->bsdf->deltaProbability(hit->wo, hit->uv);
@@ -66,9 +37,12 @@ bool ImportonWalk::goOn(const SurfaceHit& hit, const GuidedSampler::Vertex* vert
   if (!scattered) return false;
   state_.weight *= scattered->weight;
   state_.ray = spawnRay(hit, scattered->direction);
-  pdf_ = scattered->pdf;
-  previous_ = hit.position;
-  if (scattered->pdf > 0) remember(hit, *vertex, *scattered);
+  if (scattered->pdf > 0) {
+    emissionWeight_.scattered(hit.position, scattered->direction, scattered->pdf);
+    remember(hit, *vertex, *scattered);
+  } else {
+    emissionWeight_.passed(hit, scattered->wi, scene_.shadowSurfaces);
+  }
   return survivesAlbedo(state_.weight, hit, rng_) && usable(luminance(state_.weight));
 }
 
@@ -84,8 +58,8 @@ void ImportonWalk::arrive(const SurfaceHit& hit) {
 // estimation.
 void ImportonWalk::escape() {
   const Vec3& wi = state_.ray.direction;
-  const float fraction = pdf_ > 0 ? misWeight(pdf_, scene_.lights.environmentPdf(wi)) : 1.0f;
-  const Rgb light = state_.weight * scene_.lights.environmentRadiance(wi) * fraction;
+  const Rgb light =
+      state_.weight * scene_.lights.environmentRadiance(wi) * emissionWeight_.ofEnvironment(scene_.lights);
   collect(light);
   const float weight = luminance(light);
   if (wishes_.uses && depth_ > 1 && usable(weight)) result_.uses.push_back({state_.ray.origin, wi, weight});
@@ -98,22 +72,25 @@ void ImportonWalk::addDirectLight(const SurfaceHit& hit, const GuidedSampler::Ve
   if (!light) return;
   const Vec3 wi = hit.frame.toLocal(light->wi);
   if (!sidesAgree(hit, light->wi, wi)) return;
-  const Rgb value = state_.weight * evalBsdf(hit, wi) * light->radiance * (std::abs(wi.z()) / light->pdf);
+  const Rgb value = state_.weight * evalBsdf(hit, wi) * (std::abs(wi.z()) / light->pdf);
   if (!usable(luminance(value))) return;
   const float weight = light->delta ? 1.0f : misWeight(light->pdf, smoothFraction * vertex.pdf(wi));
-  if (!light->source && !light->delta)
-    addEnvironmentLight(hit, light->wi, value, weight);
-  else if ((wishes_.samples || wishes_.fractions) && scene_.visible(hit, *light))
-    collect(value * weight);
+  const bool fromEnvironment = !light->source && !light->delta;
+  if (fromEnvironment && wishes_.uses) return addEnvironmentLight(hit, *light, value * weight);
+  std::uint64_t rays = 0;
+  collect(value * weight * scene_.arriving(hit, *light, kMaxTrainingDepth, rays));
 }
 
-void ImportonWalk::addEnvironmentLight(const SurfaceHit& hit, const Vec3& wi, const Rgb& light, float weight) {
-  const Passage passage = passageToEnvironment(scene_.tracer, hit, wi);
-  if (passage == Passage::free) collect(light * weight);
-  // Unoccluded light at the first surface is left to the renderer's next-event estimation, which does not find light
-  // through panes.
-  if (!wishes_.uses || passage == Passage::blocked || (passage == Passage::free && depth_ == 1)) return;
-  result_.uses.push_back({hit.position, wi, luminance(light) * (passage == Passage::free ? weight : 1.0f)});
+// As RenderScene::arriving, and tells where photons of this light enter the scene. Light at the first surface is left
+// to the renderer's next-event estimation.
+void ImportonWalk::addEnvironmentLight(const SurfaceHit& hit, const LightSample& light, const Rgb& throughput) {
+  const TransmittedRay end = scene_.follow(spawnRay(hit, light.wi), scene_.shadowSurfaces);
+  if (end.hit) return;
+  const Rgb value = throughput * end.transmittance *
+                    (end.bent ? scene_.lights.environmentRadiance(end.last.direction) : light.radiance);
+  collect(value);
+  const float weight = luminance(value);
+  if (depth_ > 1 && usable(weight)) result_.uses.push_back({end.last.origin, end.last.direction, weight});
 }
 
 void ImportonWalk::remember(const SurfaceHit& hit, const GuidedSampler::Vertex& vertex, const Scattered& scattered) {

@@ -36,7 +36,7 @@ struct ImportonWishes {
 class ImportonWalk {
  public:
   /// All references must outlive the walk, which appends to the result.
-  ImportonWalk(const RenderScene& scene, const GuidedSampler& sampler, const ImportonWishes& wishes, Rng& rng,
+  ImportonWalk(const RenderScene& scene, const GuidedSampler& sampler, const ImportonWishes& wishes, Sampler& rng,
                ImportonResult& result)
       : scene_(scene),
         sampler_(sampler),
@@ -55,22 +55,21 @@ class ImportonWalk {
   void arrive(const SurfaceHit& hit);
   void escape();
   void addDirectLight(const SurfaceHit& hit, const GuidedSampler::Vertex& vertex, float smoothFraction);
-  void addEnvironmentLight(const SurfaceHit& hit, const Vec3& wi, const Rgb& light, float weight);
+  void addEnvironmentLight(const SurfaceHit& hit, const LightSample& light, const Rgb& throughput);
   void collect(const Rgb& light) { recorder_.addLight(asFloats(light)); }
   void remember(const SurfaceHit& hit, const GuidedSampler::Vertex& vertex, const Scattered& scattered);
 
   const RenderScene& scene_;
   const GuidedSampler& sampler_;
   const ImportonWishes wishes_;
-  Rng& rng_;
+  Sampler& rng_;
   ImportonResult& result_;
 
   ParticleState state_;
   int depth_ = 0;
-  float pdf_ = 0;                // of the last direction; 0 after the camera or a delta component
+  EmissionWeight emissionWeight_;
   bool scattered_ = false;       // at a non-delta component at least once
   bool awaitsDistance_ = false;  // the recorder needs the distance from the last vertex
-  Vec3 previous_ = Vec3::Zero();
   PathRecorder recorder_;
 };
 

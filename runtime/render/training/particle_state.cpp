@@ -3,7 +3,7 @@
 namespace lobe {
 namespace {
 
-std::optional<Scattered> scatterDelta(const SurfaceHit& hit, float fraction, float fluxScale(float), Rng& rng) {
+std::optional<Scattered> scatterDelta(const SurfaceHit& hit, float fraction, float fluxScale(float), Sampler& rng) {
   const std::optional<DeltaSample> sample = sampleDelta(hit, rng.uniform());
   if (!sample) return std::nullopt;
   return Scattered{sample->wi, {}, sample->weight * (fluxScale(sample->eta) / fraction), 0};
@@ -12,7 +12,7 @@ std::optional<Scattered> scatterDelta(const SurfaceHit& hit, float fraction, flo
 }  // namespace
 
 std::optional<Scattered> scatter(const SurfaceHit& hit, const GuidedSampler::Vertex* vertex, Transport transport,
-                                 Rng& rng) {
+                                 Sampler& rng) {
   // Sample weights include the scaling of radiance by refraction, which does not apply to flux.
   float (*const fluxScale)(float) =
       transport == Transport::flux ? [](float eta) { return eta * eta; } : [](float) { return 1.0f; };
@@ -34,7 +34,7 @@ std::optional<Scattered> scatter(const SurfaceHit& hit, const GuidedSampler::Ver
   return scattered;
 }
 
-bool survivesAlbedo(Rgb& weight, const SurfaceHit& hit, Rng& rng) {
+bool survivesAlbedo(Rgb& weight, const SurfaceHit& hit, Sampler& rng) {
   const float survival = std::min(1.0f, luminance(hit.bsdf->albedo(hit.wo, hit.uv)));
   if (!(rng.uniform() < survival)) return false;
   weight /= survival;

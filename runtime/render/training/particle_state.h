@@ -29,12 +29,12 @@ struct Scattered {
 /// Scatters a particle. The direction of the non-delta component is sampled at `vertex`, which must not be null if
 /// deltaProbability is below 1. nullopt: the particle is absorbed.
 std::optional<Scattered> scatter(const SurfaceHit& hit, const GuidedSampler::Vertex* vertex, Transport transport,
-                                 Rng& rng);
+                                 Sampler& rng);
 
 /// Russian roulette with the surface's albedo as survival probability, whatever direction was sampled: guiding gives
 /// small weights to particles in directions where there are many, which must not be terminated for that reason. Divides
 /// the weight of survivors by the probability.
-bool survivesAlbedo(Rgb& weight, const SurfaceHit& hit, Rng& rng);
+bool survivesAlbedo(Rgb& weight, const SurfaceHit& hit, Sampler& rng);
 
 /// The geometric normal on the side from which the particle arrives.
 inline Vec3 normalTowards(const SurfaceHit& hit) {

@@ -5,6 +5,9 @@
 namespace lobe {
 namespace {
 
+// Keeps the random numbers of training apart from those of rendering with the same seed.
+constexpr std::uint64_t kTrainingSeed = 0x747261696e696e67;
+
 constexpr int kChunk = 1024;
 // Path numbers of photons follow those of importons.
 constexpr std::uint64_t kFirstPhoton = std::uint64_t{1} << 32;
@@ -16,7 +19,7 @@ std::vector<Result> traceChunks(std::uint64_t seed, std::uint64_t stream, int co
   std::vector<Result> results(chunks);
   parallelFor(0, chunks, [&](int chunk) {
     for (int i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
-      Rng rng(seed, stream, i);
+      Sampler rng(seed, stream, i);
       trace(i, rng, results[chunk]);
     }
   });
@@ -27,11 +30,16 @@ std::vector<Result> traceChunks(std::uint64_t seed, std::uint64_t stream, int co
 
 ParticleTracer::ParticleTracer(const RenderScene& scene, const RayCamera& camera, const GuidedSampler& radiance,
                                const GuidedSampler& importance, const EnvironmentGuide* guide, std::uint64_t seed)
-    : scene_(scene), camera_(camera), radiance_(radiance), importance_(importance), guide_(guide), seed_(seed) {}
+    : scene_(scene),
+      camera_(camera),
+      radiance_(radiance),
+      importance_(importance),
+      guide_(guide),
+      seed_(seed ^ kTrainingSeed) {}
 
 ImportonResult ParticleTracer::traceImportons(int pass, int count, const ImportonWishes& wishes) const {
   auto results = traceChunks<ImportonResult>(
-      seed_, 2 * static_cast<std::uint64_t>(pass), count, [&](int i, Rng& rng, ImportonResult& result) {
+      seed_, 2 * static_cast<std::uint64_t>(pass), count, [&](int i, Sampler& rng, ImportonResult& result) {
         const Vec2 pixel = rng.uniform2();
         const int x = static_cast<int>(pixel.x() * static_cast<float>(camera_.width()));
         const int y = static_cast<int>(pixel.y() * static_cast<float>(camera_.height()));
@@ -51,7 +59,7 @@ PhotonResult ParticleTracer::tracePhotons(int pass, int count) const {
   PhotonResult all;
   if (scene_.lights.empty()) return all;
   auto results = traceChunks<PhotonResult>(
-      seed_, 2 * static_cast<std::uint64_t>(pass) + 1, count, [&](int i, Rng& rng, PhotonResult& result) {
+      seed_, 2 * static_cast<std::uint64_t>(pass) + 1, count, [&](int i, Sampler& rng, PhotonResult& result) {
         if (const std::optional<EmittedPhoton> photon = emit(rng))
           PhotonWalk(scene_, importance_, rng, result).run(*photon, kFirstPhoton + static_cast<std::uint64_t>(i));
       });
@@ -62,7 +70,7 @@ PhotonResult ParticleTracer::tracePhotons(int pass, int count) const {
   return all;
 }
 
-std::optional<EmittedPhoton> ParticleTracer::emit(Rng& rng) const {
+std::optional<EmittedPhoton> ParticleTracer::emit(Sampler& rng) const {
   const float environment = guide_ ? scene_.lights.environmentProbability() : 0.0f;
   const float choice = rng.uniform();
   const Vec2 u1 = rng.uniform2();

@@ -20,7 +20,7 @@ class ParticleTracer {
   PhotonResult tracePhotons(int pass, int count) const;
 
  private:
-  std::optional<EmittedPhoton> emit(Rng& rng) const;
+  std::optional<EmittedPhoton> emit(Sampler& rng) const;
 
   const RenderScene& scene_;
   const RayCamera& camera_;

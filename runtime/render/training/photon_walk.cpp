@@ -15,18 +15,6 @@ constexpr int kMaxWaiting = 64;  // branches of one photon in the queue
 // endlessly.
 constexpr int kMaxBranchesOfPhoton = 512;
 
-/// Multiple importance weight of BSDF sampling against next-event estimation, 0 for delta lights. The density cosθ/π
-/// replaces that of BSDF sampling, which is not yet known.
-float directFraction(const EmittedPhoton& photon, const SurfaceHit& hit) {
-  const float cosine = std::abs(hit.normal.dot(hit.woWorld));
-  float emitter = photon.emitterDensity;
-  if (!photon.far) {
-    const float cosineAtLight = std::abs(photon.normal.dot(photon.ray.direction));
-    emitter *= hit.distance * hit.distance / std::max(cosineAtLight, 1e-6f);
-  }
-  return misWeight(std::max(cosine * kInvPi, 1e-6f), emitter);
-}
-
 }  // namespace
 
 void PhotonWalk::run(const EmittedPhoton& photon, std::uint64_t index) {
@@ -63,17 +51,55 @@ void PhotonWalk::branchOff(Branch branch, const SurfaceHit& hit, const GuidedSam
     if (!scattered) continue;
     Rgb weight = branch.state.weight * scattered->weight;
     if (survivesAlbedo(weight, hit, rng_))
-      waiting_.push_back({{spawnRay(hit, scattered->direction), weight}, branch.depth + 1});
+      waiting_.push_back(
+          {{spawnRay(hit, scattered->direction), weight}, branch.depth + 1, passageAfter(branch, hit, *scattered)});
   }
 }
 
+PhotonWalk::Passage PhotonWalk::passageAfter(const Branch& branch, const SurfaceHit& hit,
+                                             const Scattered& scattered) const {
+  Passage passage = branch.passage;
+  passage.specular = passage.specular && scattered.pdf == 0;
+  if (!passage.specular || !passage.followed) return passage;
+  const bool transmitted = scattered.wi.z() * hit.wo.z() < 0;
+  const std::optional<DeltaTransmission> through = transmitted ? deltaTransmission(hit) : std::nullopt;
+  passage.followed = through && ++passage.surfaces <= scene_.shadowSurfaces;
+  passage.bent = passage.bent || !through || !through->straight;
+  passage.distance += hit.distance;
+  return passage;
+}
+
+/// The fraction of a photon's light that next-event estimation leaves to BSDF sampling: the multiple importance weight
+/// of BSDF sampling, for which cosθ/π replaces the density that is not yet known. Zero for delta lights, which BSDF
+/// sampling does not find.
+float PhotonWalk::directFraction(const EmittedPhoton& photon, const Passage& passage, const SurfaceHit& hit) const {
+  if (!passage.specular) return 1;
+  if (std::isinf(photon.emitterDensity)) return 0;
+  if (!passage.followed || (passage.bent && !photon.far)) return 1;
+  float emitter = photon.emitterDensity;
+  if (passage.bent) {
+    emitter = scene_.lights.environmentPdf(hit.woWorld);
+  } else if (!photon.far) {
+    const float distance = passage.distance + hit.distance;
+    const float cosineAtLight = std::abs(photon.normal.dot(photon.ray.direction));
+    emitter *= distance * distance / std::max(cosineAtLight, 1e-6f);
+  }
+  const float cosine = std::abs(hit.normal.dot(hit.woWorld));
+  return misWeight(std::max(cosine * kInvPi, 1e-6f), emitter);
+}
+
 void PhotonWalk::store(const EmittedPhoton& photon, const Branch& branch, const SurfaceHit& hit) {
-  const bool first = branch.depth == 1;
+  const Passage& passage = branch.passage;
+  const bool straight = passage.specular && passage.followed && !passage.bent;
   const float flux = luminance(branch.state.weight);
-  const float weight = flux * (first ? directFraction(photon, hit) : 1.0f);
+  const float weight = flux * directFraction(photon, passage, hit);
+  const float distance = passage.distance + hit.distance;
   if (usable(weight))
     result_.radiance.addPhoton(asFloats(hit.position), asFloats(normalTowards(hit)), asFloats(hit.woWorld), weight,
-                               first && photon.far ? kInfinity : hit.distance, flux);
+                               straight && photon.far ? kInfinity
+                               : straight             ? distance
+                                                      : hit.distance,
+                               flux);
 }
 
 // Number of branches that continue. Below the window, Russian roulette may terminate the photon; above it the photon is

@@ -19,17 +19,28 @@ class PhotonWalk {
  public:
   /// All references must outlive the walk, which appends to the result. importance: guides directions by what was
   /// learnt from importons.
-  PhotonWalk(const RenderScene& scene, const GuidedSampler& importance, Rng& rng, PhotonResult& result)
+  PhotonWalk(const RenderScene& scene, const GuidedSampler& importance, Sampler& rng, PhotonResult& result)
       : scene_(scene), importance_(importance), rng_(rng), result_(result) {}
 
   /// index: number of the path, passed to the sample storages.
   void run(const EmittedPhoton& photon, std::uint64_t index);
 
  private:
+  /// How a photon came here from its light, while it has met delta components only.
+  struct Passage {
+    bool specular = true;  ///< met delta components only
+    bool followed = true;  ///< and next-event estimation would follow the same way
+    bool bent = false;
+    int surfaces = 0;
+    float distance = 0;  ///< from the light
+  };
   struct Branch {
     ParticleState state;
     int depth;
+    Passage passage = {};
   };
+  Passage passageAfter(const Branch& branch, const SurfaceHit& hit, const Scattered& scattered) const;
+  float directFraction(const EmittedPhoton& photon, const Passage& passage, const SurfaceHit& hit) const;
   void advance(const EmittedPhoton& photon, const Branch& branch);
   /// Scatters the branches that leave a surface; for vertex see scatter().
   void branchOff(Branch branch, const SurfaceHit& hit, const GuidedSampler::Vertex* vertex);
@@ -38,7 +49,7 @@ class PhotonWalk {
 
   const RenderScene& scene_;
   const GuidedSampler& importance_;
-  Rng& rng_;
+  Sampler& rng_;
   PhotonResult& result_;
   float power_ = 0;  // emitted power, luminance
   std::vector<Branch> waiting_;

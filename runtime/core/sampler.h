@@ -1,0 +1,59 @@
+#pragma once
+// The random numbers of one path: low-discrepancy points for the dimensions that matter most, independent numbers for
+// the others.
+
+#include "runtime/core/random.h"
+#include "runtime/core/sobol.h"
+
+namespace lobe {
+
+/// Hands out numbers in the order in which a path asks for them. Each number is uniform in [0, 1) and independent of
+/// the others of the same path, so that every estimate is unbiased; the stratified numbers of different paths of a
+/// pixel depend on each other, which is what lowers the error of their mean.
+class Sampler {
+ public:
+  /// Independent numbers only. Arguments as those of Rng.
+  explicit Sampler(std::uint64_t seed, std::uint64_t stream = 0, std::uint64_t index = 0)
+      : rng_(seed, stream, index), dimension_(kSobolDimensions), index_(0), scramble_(0) {}
+
+  /// Sample `index` of a pixel: the first kSobolDimensions stratified numbers are those of an Owen-scrambled Sobol'
+  /// sequence, with a scrambling of its own for each (seed, pixel).
+  static Sampler stratified(std::uint64_t seed, std::uint64_t pixel, std::uint32_t index) {
+    Sampler sampler(seed, pixel, index);
+    sampler.dimension_ = 0;
+    sampler.index_ = index;
+    sampler.scramble_ = Rng(seed, pixel).next();
+    return sampler;
+  }
+
+  /// Independent of all other numbers. For decisions such as Russian roulette.
+  float uniform() { return rng_.uniform(); }
+  Eigen::Vector2f uniform2() { return rng_.uniform2(); }
+
+  /// For the position on the film and the lens, and for the choice of lights and directions at the first vertices.
+  float stratified() {
+    if (dimension_ >= kSobolDimensions) return rng_.uniform();
+    const std::uint32_t seed = scramble_ ^ (0x9e3779b9u * static_cast<std::uint32_t>(dimension_ + 1));
+    const std::uint32_t x = owenScramble(sobol(index_, dimension_), mixed(seed));
+    ++dimension_;
+    return static_cast<float>(x >> 8) * 0x1p-24f;
+  }
+  Eigen::Vector2f stratified2() {
+    const float x = stratified();
+    return {x, stratified()};
+  }
+
+ private:
+  // A 32-bit finaliser (MurmurHash3).
+  static std::uint32_t mixed(std::uint32_t x) {
+    x = (x ^ (x >> 16)) * 0x85ebca6bu;
+    x = (x ^ (x >> 13)) * 0xc2b2ae35u;
+    return x ^ (x >> 16);
+  }
+
+  Rng rng_;
+  int dimension_;
+  std::uint32_t index_, scramble_;
+};
+
+}  // namespace lobe

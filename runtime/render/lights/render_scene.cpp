@@ -1,0 +1,85 @@
+#include "runtime/render/lights/render_scene.h"
+
+#include <algorithm>
+
+namespace lobe {
+namespace {
+
+bool anyTransmits(const Scene& scene) {
+  return std::ranges::any_of(scene.materials, [](const Material& m) { return m.bsdf && m.bsdf->transmits(); });
+}
+
+/// Segments end slightly before the light, so that they do not hit it.
+constexpr float kBeforeLight = 1.0f - 0x1p-18f;
+
+}  // namespace
+
+RenderScene::RenderScene(const Scene& s, int surfaces)
+    : scene(s), tracer(s), lights(s, tracer.bounds()), shadowSurfaces(anyTransmits(s) ? surfaces : 0) {}
+
+bool RenderScene::visible(const SurfacePoint& from, const LightSample& light) const {
+  if (!light.source) return !tracer.occluded(spawnRay(from, light.wi));
+  // Both end points are moved off their surfaces.
+  const Vec3 origin = offsetPoint(from, light.wi);
+  const Vec3 target = offsetPoint(*light.source, -light.wi);
+  return !tracer.occluded({origin, target - origin, kBeforeLight});
+}
+
+TransmittedRay RenderScene::follow(Ray ray, int maxSurfaces, const Vec3* target) const {
+  TransmittedRay result;
+  for (;;) {
+    result.last = ray;
+    result.hit = tracer.trace(ray);
+    if (!result.hit || result.surfaces == maxSurfaces) return result;
+    const SurfaceHit& hit = *result.hit;
+    if (!hit.bsdf || !hit.bsdf->transmits() || !sidesAgree(hit, hit.woWorld, hit.wo)) return result;
+    const std::optional<DeltaTransmission> through = deltaTransmission(hit);
+    if (!through || (target && !through->straight)) return result;
+    const Vec3 direction = hit.frame.toWorld(through->wi).normalized();
+    if (!sidesAgree(hit, direction, through->wi) || !(through->weight.maxCoeff() > 0)) return result;
+    result.transmittance *= through->weight;
+    result.bent = result.bent || !through->straight;
+    ++result.surfaces;
+    ray = spawnRay(hit, direction);
+    if (target) {
+      const Vec3 left = *target - ray.origin;
+      ray.tfar = left.norm() * kBeforeLight;
+      ray.direction = left.normalized();
+    }
+  }
+}
+
+Rgb RenderScene::arriving(const SurfacePoint& from, const LightSample& light, int maxSurfaces,
+                          std::uint64_t& rays) const {
+  ++rays;
+  const int most = std::min(shadowSurfaces, maxSurfaces);
+  if (most <= 0) return visible(from, light) ? light.radiance : Rgb(Rgb::Zero());
+  Ray ray = spawnRay(from, light.wi);
+  TransmittedRay end;
+  if (light.source) {
+    const Vec3 target = offsetPoint(*light.source, -light.wi);
+    const Vec3 segment = target - ray.origin;
+    const float length = segment.norm();
+    if (!(length > 0)) return light.radiance;
+    ray = {ray.origin, segment / length, length * kBeforeLight};
+    end = follow(ray, most, &target);
+  } else {
+    end = follow(ray, most);
+  }
+  rays += static_cast<std::uint64_t>(end.surfaces);
+  // A directional light is not found along a direction that was changed.
+  if (end.hit || (end.bent && light.delta)) return Rgb::Zero();
+  return end.transmittance * (end.bent ? lights.environmentRadiance(end.last.direction) : light.radiance);
+}
+
+void EmissionWeight::passed(const SurfaceHit& hit, const Vec3& wi, int shadowSurfaces) {
+  const bool transmitted = wi.z() * hit.wo.z() < 0;
+  const std::optional<DeltaTransmission> through =
+      pdf_ > 0 && transmitted && ++surfaces_ <= shadowSurfaces ? deltaTransmission(hit) : std::nullopt;
+  if (!through)
+    pdf_ = 0;
+  else
+    bent_ = bent_ || !through->straight;
+}
+
+}  // namespace lobe
