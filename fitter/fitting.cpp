@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -32,23 +33,35 @@ class HostLobe : public Lobe {
   }
   std::optional<LobeSample> sample(const Vec3& wo, const Vec2& u) const override {
     const std::optional<LobeDirection> drawn = functions_.sample(floats(wo), {u.x(), u.y()});
-    if (!drawn || !(drawn->wi.z > 0)) return std::nullopt;
-    return LobeSample{{drawn->wi.x, drawn->wi.y, drawn->wi.z}, drawn->pdf};
+    if (!drawn) return std::nullopt;
+    const Vec3 wi(drawn->wi.x, drawn->wi.y, drawn->wi.z);
+    if (!(std::abs(wi.norm() - 1) < 1e-3f)) refuse("sample returns a direction that is not a unit vector");
+    if (wi.z() <= 0) return std::nullopt;
+    return LobeSample{wi, drawn->pdf};
   }
-  float pdf(const Vec3& wo, const Vec3& wi) const override { return functions_.pdf(floats(wo), floats(wi)); }
+  float pdf(const Vec3& wo, const Vec3& wi) const override {
+    const float density = functions_.pdf(floats(wo), floats(wi));
+    if (!(density >= 0 && std::isfinite(density))) refuse("pdf returns a value that is negative or not finite");
+    return density;
+  }
 
  private:
+  [[noreturn]] void refuse(const char* fault) const {
+    throw std::runtime_error(fmt::format("lobe {}: {}", functions_.model, fault));
+  }
+
   LobeFunctions functions_;
 };
 
 void validate(const LobeFunctions& lobe) {
-  const bool named = !lobe.model.empty() && std::ranges::all_of(lobe.model, [](unsigned char c) {
-    return std::isalnum(c) || c == '-' || c == '_';
-  });
+  const bool named =
+      !lobe.model.empty() && lobe.model.size() <= 64 &&
+      std::ranges::all_of(lobe.model, [](unsigned char c) { return std::isalnum(c) || c == '-' || c == '_'; });
   if (!named)
     throw std::runtime_error(
-        fmt::format("LobeFunctions::model '{}' must be a name of letters, digits, '-' and '_'", lobe.model));
-  if (lobe.key.empty()) throw std::runtime_error("LobeFunctions::key must not be empty");
+        fmt::format("LobeFunctions::model '{}' must be a name of up to 64 letters, digits, '-' and '_'", lobe.model));
+  if (lobe.key.empty() || std::ranges::any_of(lobe.key, [](unsigned char c) { return std::iscntrl(c) != 0; }))
+    throw std::runtime_error("LobeFunctions::key must be text without control characters");
   if (!lobe.evaluate || !lobe.sample || !lobe.pdf)
     throw std::runtime_error("LobeFunctions: evaluate, sample and pdf must all be set");
 }
@@ -77,6 +90,10 @@ CompiledLobe compileLobe(const LobeFunctions& lobe, const FittingOptions& option
   const LobeCache cache = LobeCache::open(job.path);
   float worst = 0;
   for (const CacheRecord& r : cache.records()) worst = std::max({worst, r.nev, r.nevCoverage});
+  const bool black = std::ranges::none_of(cache.records(), [](const CacheRecord& r) { return r.integral > 0; });
+  if (black && lobe.evaluate({0, 0, 1}, {0, 0, 1}) > 0)
+    throw std::runtime_error(
+        fmt::format("lobe {}: sample draws no direction although evaluate is positive", lobe.model));
   return {job.path, !job.upToDate, cache.records().size(), worst};
 }
 

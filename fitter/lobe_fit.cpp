@@ -87,7 +87,8 @@ Mixture DirectionFitter::expectationMaximised(const FitSettings& settings) const
   std::vector<WeightedPoint> points = weightedPoints(draws_);
   Spread spread = spreadOf(points);
   if (points.size() < 3) spread = {kBroadVariance, 0, kBroadVariance};
-  if (!(spread.smallerVariance() > kSharpest * kSharpest)) refuseLobe(lobe_, wo_, "it is too sharp, use a mirror");
+  if (!(spread.smallerVariance() > kSharpest * kSharpest))
+    refuseLobe(lobe_, wo_, "it is too narrow to be fitted; treat it as a delta lobe");
   Mixture mixture = startMixture(points, spread, settings.components);
   WeightedEmOptions options;
   options.minVariance = kVarianceFloor * spread.smallerVariance();

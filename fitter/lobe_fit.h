@@ -51,7 +51,7 @@ class DirectionFitter {
 /// and one broad component. Least squares starts from weighted EM, or from `start` if it is not empty (the mixture of a
 /// neighbouring direction, aligned with wo), whose components keep their order and number. The result of least squares
 /// is kept only if its grade (Quality::worse) is better than that of the start. Throws std::runtime_error if the lobe
-/// returns numbers that are not finite or is too sharp.
+/// returns numbers that are not finite or is too narrow.
 FittedRecord fitLobe(const Lobe& lobe, const Vec3& wo, const FitSettings& settings,
                      std::span<const Gaussian> start = {});
 

@@ -4,7 +4,7 @@
 //
 // The reference is f(ω) = w(ω) L(ω) cosθ over the hemisphere of a receiver, in luminance, where L is the radiance of
 // all paths. The weight w removes the part that next-event estimation (NEE) finds, as it is removed from the weights of
-// particles. Light straight from an emitter is weighted by the multiple importance weight (power heuristic) of a
+// particles. Direct light from an emitter is weighted by the multiple importance weight (power heuristic) of a
 // density cosθ/π against NEE, because the actual density is unknown when particles are stored; delta lights therefore
 // do not count. Scattered light, including light through window panes, counts fully, because NEE does not find it.
 

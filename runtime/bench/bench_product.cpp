@@ -177,7 +177,7 @@ class SampleTimer {
 std::vector<Ray> incoherentRays(const Scene& scene, const RayTracer& tracer) {
   constexpr int kBounces = 6;
   const RayCamera camera(scene.camera, scene.filter);
-  Rng rng(4);
+  Sampler rng(4);
   std::vector<Ray> rays;
   while (static_cast<int>(rays.size()) < kRays) {
     const Vec2 pixel = rng.uniform2();

@@ -376,7 +376,7 @@ int main(int argc, char** argv) {
   return lobe::runTool(
       "lobebench-vertices",
       "Trains a scene and measures, at random vertices of camera paths, the relative variance (NEV) of one sample of "
-      "BSDF times cosine times incident radiance for several densities of directions; prints JSON. Light straight from "
+      "BSDF times cosine times incident radiance for several densities of directions; prints JSON. Direct light from "
       "an emitter is weighted as multiple importance sampling weights cosine-weighted directions.",
       argc, argv, [&](CLI::App& app) { declare(app, options); }, [&] { run(options); });
 }

@@ -1,9 +1,12 @@
 #include "runtime/guiding/brdf_caches.h"
 
 #include <algorithm>
+#include <cassert>
+#include <cmath>
 #include <map>
 #include <numbers>
 #include <stdexcept>
+#include <tuple>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -70,10 +73,11 @@ const BrdfCaches::Record& BrdfCaches::Entry::nearest(const Vec3& wo) const {
 
 BrdfCaches::BrdfCaches(const std::filesystem::path& folder, std::span<const LobeRequest> requests,
                        const std::string& remedy, float reduction) {
-  std::map<std::string, int> known;
-  std::map<std::string, std::vector<std::string>> faults;  // message -> materials
+  std::map<std::tuple<std::string, std::string, int>, int> known;  // by model, key and revision
+  std::map<std::string, std::vector<std::string>> faults;          // message -> materials
   for (const LobeRequest& request : requests) {
-    auto [entry, added] = known.try_emplace(request.key, static_cast<int>(caches_.size()));
+    auto [entry, added] =
+        known.try_emplace({request.model, request.key, request.revision}, static_cast<int>(caches_.size()));
     cacheOfRequest_.push_back(entry->second);
     if (!added) continue;
     try {
@@ -92,6 +96,7 @@ BrdfCaches::BrdfCaches(const std::filesystem::path& folder, std::span<const Lobe
 }
 
 void BrdfCaches::add(int lobe, const Vec3& wo, const Vec2& turn, float tint, Reflectance& reflectance) const {
+  assert(lobe >= 0 && static_cast<std::size_t>(lobe) < cacheOfRequest_.size() && std::isfinite(tint));
   const Entry& entry = caches_[cacheOfRequest_[lobe]];
   const Mirror mirror = entry.cache.info().quarter ? Mirror::intoQuadrant(wo) : Mirror{};
   const Record& record = entry.nearest(mirror(wo));

@@ -38,7 +38,7 @@ auto inOrder(const SampleStorageData& data, const Use& use) {
 
 void FieldOptions::validate() const {
   static_assert(kMostComponents == kMaxLightComponents);
-  if (!(sceneDiagonal > 0))
+  if (!(sceneDiagonal > 0 && std::isfinite(sceneDiagonal)))
     throw std::runtime_error(fmt::format("training option sceneDiagonal must be positive, not {}", sceneDiagonal));
   trainingOptions(*this).validate();
 }

@@ -79,8 +79,8 @@ std::vector<RecordRequest> takeApart(std::vector<RecordRequest>& waiting, float 
 void TrainingOptions::validate() const {
   require(components >= 1 && components <= kMaxIlluminationComponents / 2, "components", "from 1 to 8");
   require(neighbours >= 1, "neighbours", "at least 1");
-  require(unitFraction > 0 && unitFraction <= 1, "unitFraction", "over 0 and at most 1");
-  require(klThreshold > 0, "klThreshold", "over 0");
+  require(unitFraction > 0 && unitFraction <= 1, "unitFraction", "in (0, 1]");
+  require(klThreshold > 0, "klThreshold", "positive");
 }
 
 IlluminationTrainer::IlluminationTrainer(const TrainingOptions& options, float sceneDiagonal)
@@ -106,7 +106,7 @@ void IlluminationTrainer::fill(std::span<const std::span<const Particle>> source
 void IlluminationTrainer::learnFractions(std::span<const FractionSample> samples) {
   std::vector<std::vector<FractionSample>> ofRecord(records_.size());
   for (const FractionSample& s : samples)
-    if (s.record < records_.size()) ofRecord[s.record].push_back(s);  // else it is of another field
+    if (s.record < records_.size()) ofRecord[s.record].push_back(s);  // other samples belong to another field
   parallelFor(std::size_t{0}, records_.size(), [&](std::size_t i) { records_[i].fraction.learn(ofRecord[i]); });
 }
 

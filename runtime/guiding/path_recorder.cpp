@@ -3,19 +3,13 @@
 #include <cmath>
 #include <limits>
 
+#include "runtime/core/vec.h"
 #include "runtime/guiding/conversions.h"
 #include "runtime/guiding/sample_storage_data.h"
 #include "runtime/guiding/surface_distribution_impl.h"
 
 namespace lobe {
 namespace {
-
-using Rgb = Eigen::Array3f;
-
-/// Rec. 709.
-float luminance(const Rgb& c) {
-  return 0.212671f * c.x() + 0.715160f * c.y() + 0.072169f * c.z();
-}
 
 bool usable(float weight) {
   return weight > 0 && std::isfinite(weight);
@@ -26,10 +20,12 @@ bool usable(float weight) {
 void PathRecorder::begin(std::uint64_t pathIndex) {
   storage_->beginPath(pathIndex);
   count_ = 0;
+  ignored_ = false;
 }
 
 void PathRecorder::addVertex(const RecordedVertex& recorded, const SurfaceDistribution* distribution) {
-  if (count_ == kMaxVertices) return;
+  ignored_ = count_ == kMaxVertices;
+  if (ignored_) return;
   const Vec3 direction = toEigen(recorded.direction);
   const Vec3 front = toEigen(recorded.normal);
   const Vec3 normal = std::copysign(1.0f, front.dot(direction)) * front;
@@ -49,7 +45,7 @@ void PathRecorder::addVertex(const RecordedVertex& recorded, const SurfaceDistri
 }
 
 void PathRecorder::setDistance(float distance) {
-  if (count_ > 0) vertices_[static_cast<std::size_t>(count_ - 1)].distance = distance;
+  if (count_ > 0 && !ignored_) vertices_[static_cast<std::size_t>(count_ - 1)].distance = distance;
 }
 
 // Light that reaches the camera passes through every earlier vertex, where it is incident radiance from the next

@@ -1,6 +1,7 @@
 #include "lobe/sample_storage.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "runtime/guiding/conversions.h"
@@ -60,6 +61,9 @@ void SampleStorage::beginPath(std::uint64_t index) {
 
 void SampleStorage::addPhoton(const Float3& position, const Float3& normal, const Float3& direction, float weight,
                               float distance, float flux) {
+  const auto finite = [](const Float3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); };
+  const bool usable = std::isfinite(weight) && weight >= 0 && std::isfinite(flux) && flux >= 0 && distance >= 0;
+  if (!usable || !finite(position) || !finite(normal) || !finite(direction)) return;
   data_->photons.push_back({toEigen(position), toEigen(normal), toEigen(direction), weight, distance, flux});
 }
 

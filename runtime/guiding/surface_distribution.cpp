@@ -1,6 +1,7 @@
 #include "lobe/surface_distribution.h"
 
 #include <algorithm>
+#include <cassert>
 #include <new>
 #include <numbers>
 
@@ -41,7 +42,7 @@ StrategyProbabilities onRepresentable(const StrategyProbabilities& probabilities
 /// The fraction of the described albedo that mixtures represent.
 float representableFraction(const Reflectance& reflectance) {
   const float all = reflectance.albedo + reflectance.unrepresentableAlbedo;
-  return all > 0 ? reflectance.albedo / all : 1.0f;
+  return all > 0 ? reflectance.albedo / all : 0.0f;
 }
 
 }  // namespace
@@ -99,11 +100,14 @@ const SurfaceDistribution::Impl& SurfaceDistribution::impl() const {
 }
 
 void SurfaceDistribution::describe(const SurfaceReflectance& reflectance, const LobeCacheSet* caches) {
+  if (!hasRecord_) return;
   Impl& self = impl();
   self.product = caches != nullptr;
   self.described = reflectance.undescribedFraction <= 0;
   if (self.product) self.collectReflectance(reflectance, *caches->caches_);
-  self.representable = (1 - reflectance.undescribedFraction) * representableFraction(self.reflectance);
+  self.representable =
+      (1 - reflectance.undescribedFraction) * (self.product ? representableFraction(self.reflectance) : 1);
+  assert(self.representable >= 0 && self.representable <= 1);
   decision_ = self.decide();
   if (decision_ == GuidingDecision::tooNarrow || decision_ == GuidingDecision::uniform) return;
   const bool halves = !self.product || decision_ == GuidingDecision::undersampled;
@@ -115,6 +119,7 @@ void SurfaceDistribution::describe(const SurfaceReflectance& reflectance, const 
 }
 
 std::optional<GuidedSample> SurfaceDistribution::sample(Strategy strategy, float choice, const Float2& u) const {
+  if (bsdfProbability_ >= 1) return std::nullopt;
   const Impl& self = impl();
   const std::optional<Vec3> guided = self.density->sample(strategy, choice, toEigen(u));
   if (!guided) return std::nullopt;

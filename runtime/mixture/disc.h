@@ -7,12 +7,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Core>
+#include "runtime/core/vec.h"
 
 namespace lobe {
-
-using Vec2 = Eigen::Vector2f;
-using Vec3 = Eigen::Vector3f;
 
 /// Maps a unit direction with z ≥ 0 to a point of the closed unit disc.
 inline Vec2 toDisc(const Vec3& w) {

@@ -41,7 +41,8 @@ struct Options {
   std::string size, record, integrator = "product", fractions = "learnt";
   int threads = 0;
   bool check = false, json = false;
-  std::vector<const CLI::Option*> training;  ///< options that some integrators ignore
+  std::vector<const CLI::Option*> guidedOnly;  ///< rendering options that path tracing ignores
+  std::vector<const CLI::Option*> training;    ///< options that some integrators ignore
 };
 
 /// Declares the training options, all of which exclude --illumination.
@@ -153,6 +154,7 @@ void declare(CLI::App& app, Options& options) {
       app.add_flag("--check", options.check,
                    "Only read the scene and print all faults, warnings and notes; exit with 1 if it cannot be read");
   app.add_flag("--json", options.json, "Print the result of --check as JSON")->needs(check);
+  options.guidedOnly = {app.get_option("--reduction"), app.get_option("--russian-roulette")};
   declareTraining(app, options);
   addDefinitions(app, job.definitions);
   addThreads(app, options.threads);
@@ -166,6 +168,9 @@ void noteUnused(const Options& options) {
         options.integrator == "product" || (options.integrator == "guided" && option->get_name() != "--bsdf-fraction");
     if (option->count() > 0 && !used) unused.push_back(option->get_name());
   }
+  if (options.integrator == "path")
+    for (const CLI::Option* option : options.guidedOnly)
+      if (option->count() > 0) unused.push_back(option->get_name());
   if (!unused.empty())
     printNote("loberender", fmt::format("--integrator {} ignores {}", options.integrator, fmt::join(unused, ", ")));
 }

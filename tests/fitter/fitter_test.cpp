@@ -203,7 +203,7 @@ TEST_CASE("fitter: lobes without reflectance get one record without components")
 TEST_CASE("fitter: errors say why a lobe cannot be fitted") {
   const DirectionGrid grid{GridKind::elevation, 4};
   CHECK_THROWS_WITH(fitGrid(TestLobe(std::nan("")), grid, {}), Catch::Contains("its value is nan"));
-  CHECK_THROWS_WITH(fitGrid(TestLobe(1, true, 5e-6f), grid, {}), Catch::Contains("too sharp"));
+  CHECK_THROWS_WITH(fitGrid(TestLobe(1, true, 5e-6f), grid, {}), Catch::Contains("too narrow"));
 }
 
 TEST_CASE("fitter: look-up rotates and translates mixtures towards the query in the right direction") {

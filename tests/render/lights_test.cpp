@@ -239,7 +239,8 @@ ProjectedTexture uneven(float perUnit) {
   return {makeBitmap(image, {.nearest = true}), Vec3::UnitX() * perUnit, Vec3::UnitZ() * perUnit};
 }
 
-// Compares the flux of photons that reach a disk with its irradiance from light sampling.
+// Compares the flux of photons that reach a disk with its irradiance from light sampling, which needs cosine-weighted
+// directions besides, as the density of the environment is zero in some directions.
 void checkPhotons(const Scene& emitters) {
   Scene scene = emitters;
   const Disk receiver{{0, 0, 0}, {0, 0, 0.4f}, {0.4f, 0, 0}};
@@ -260,7 +261,21 @@ void checkPhotons(const Scene& emitters) {
     const float lightChoice = rng.uniform();
     const auto light = ready.lights.sample(point.position, lightChoice, rng.uniform2());
     const bool lit = light && light->wi.y() > 0 && ready.visible(point, *light);
-    gathered.add(lit ? luminance(light->radiance) * light->wi.y() / light->pdf * kPi * 0.16f : 0);
+    double irradiance = 0;
+    if (lit) {
+      const float weight = light->delta ? 1.0f : misWeight(light->pdf, light->wi.y() * kInvPi);
+      irradiance += weight * luminance(light->radiance) * light->wi.y() / light->pdf;
+    }
+    const Vec3 local = squareToCosineHemisphere(rng.uniform2()), wi(local.x(), local.z(), local.y());
+    const float cosinePdf = std::max(wi.y() * kInvPi, 1e-9f);
+    const std::optional<SurfaceHit> seen = ready.tracer.trace(spawnRay(point, wi));
+    if (!seen)
+      irradiance +=
+          kPi * luminance(ready.lights.environmentRadiance(wi)) * misWeight(cosinePdf, ready.lights.environmentPdf(wi));
+    else if (seen->emitter)
+      irradiance +=
+          kPi * luminance(emittedRadiance(*seen)) * misWeight(cosinePdf, ready.lights.pdf(point.position, *seen));
+    gathered.add(irradiance * kPi * 0.16);
   }
   CHECK(photons.mean() > 0);
   CHECK(deviation(photons, gathered) < kMaxDeviation);

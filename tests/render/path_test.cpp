@@ -315,11 +315,11 @@ TEST_CASE("render: an image depends on the seed but not on threads or waves") {
     return std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(Rgb)) == 0;
   };
   const Image one = image(1, 5);
-  // Sample s of pixel i has its own random stream, independent of the wave.
+  // Sample s of pixel i has its own random numbers, which do not depend on the wave.
   Film byHand(camera.width, camera.height);
   PathStatistics statistics;
   for (int s = 0; s < 7; ++s) {
-    Sampler rng(5, 11 * camera.width + 13, s);
+    Sampler rng = Sampler::stratified(5, 11 * camera.width + 13, static_cast<std::uint32_t>(s));
     const Ray ray = pinhole.sample(13, 11, rng);
     byHand.add(13, 11, integrator.radiance(ray, rng, statistics));
   }

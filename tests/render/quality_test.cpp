@@ -99,3 +99,29 @@ TEST_CASE("quality: photons of the environment start where importons have carrie
   REQUIRE(photons > 2000);
   CHECK(fromHeavy == Approx(photons * 50.0 / 51).epsilon(0.02));
 }
+
+TEST_CASE("quality: the irradiance of records is that of the surface, for any number of photons") {
+  // Uniform light of radiance 1 from everywhere: E = π.
+  Scene scene;
+  addShape(scene, rectangle({-1, 0, -1}, {0, 0, 2}, {2, 0, 0}), addMaterial(scene, std::make_shared<Diffuse>(0.5f)));
+  scene.environment = environment(Image(8, 4, grey(1)));
+  scene.camera.width = scene.camera.height = 16;
+  scene.camera.toWorld.col(1) << 0, 0, 1, 0;  // looks down from above
+  scene.camera.toWorld.col(2) << 0, -1, 0, 0;
+  scene.camera.toWorld.col(3) << 0, 2, 0, 1;
+  const RenderScene ready(scene);
+  const RayCamera camera(scene.camera, {});
+  for (const int photons : {20000, 80000}) {
+    CAPTURE(photons);
+    TrainingPlan plan;
+    plan.passes = 3;
+    plan.photons = photons;
+    plan.importons = 4000;
+    const Field field = trainIllumination(ready, camera, nullptr, plan).field;
+    // Away from the edge, where records look beyond the surface.
+    Moments irradiance;
+    for (const IlluminationRecord& r : cacheOf(field).records())
+      if (r.position.cwiseAbs().maxCoeff() < 0.8f) irradiance.add(r.irradiance);
+    CHECK(irradiance.mean() == Approx(kPi).epsilon(0.1));
+  }
+}

@@ -1,5 +1,5 @@
-// Next-event estimation through panes, slabs, balls and masks: against closed forms, and against paths that find the same
-// light by sampling directions alone.
+// Next-event estimation through panes, slabs, balls and masks: against closed forms, and against paths that find the
+// same light by sampling directions alone.
 
 #include <numbers>
 
@@ -74,7 +74,8 @@ Moments seen(const Scene& scene, int surfaces, int samples, int maxDepth = 30) {
 TEST_CASE("transmission: light through a pane has the transmittance of a slab") {
   Scene scene = smallReceiver();
   scene.environment = upperHalf();
-  addShape(scene, rectangle({-1e3f, 1, -1e3f}, {0, 0, 2e3f}, {2e3f, 0, 0}), addMaterial(scene, glass("thindielectric")));
+  addShape(scene, rectangle({-1e3f, 1, -1e3f}, {0, 0, 2e3f}, {2e3f, 0, 0}),
+           addMaterial(scene, glass("thindielectric")));
   const double expected = kAlbedo * slabTransmittance();
   for (const int surfaces : {0, 16}) CHECK(deviation(seen(scene, surfaces, 100000), expected) < kMaxDeviation);
 }
@@ -92,8 +93,7 @@ TEST_CASE("transmission: a glass ball in uniform light changes nothing") {
   Scene scene = smallReceiver();
   scene.environment = environment(Image(8, 4, grey(1)));
   addShape(scene, Sphere{{0.2f, 1, 0.1f}, 0.6f}, addMaterial(scene, glass("dielectric")));
-  for (const int surfaces : {0, 1, 16})
-    CHECK(deviation(seen(scene, surfaces, 200000, 200), kAlbedo) < kMaxDeviation);
+  for (const int surfaces : {0, 1, 16}) CHECK(deviation(seen(scene, surfaces, 200000, 200), kAlbedo) < kMaxDeviation);
 }
 
 TEST_CASE("transmission: next-event estimation through refraction agrees with paths that find the light by chance") {
@@ -138,7 +138,8 @@ TEST_CASE("transmission: a point light shines through a pane") {
 TEST_CASE("transmission: the maximum depth counts the surfaces that next-event estimation passes") {
   Scene scene = smallReceiver();
   scene.environment = upperHalf();
-  addShape(scene, rectangle({-1e3f, 1, -1e3f}, {0, 0, 2e3f}, {2e3f, 0, 0}), addMaterial(scene, glass("thindielectric")));
+  addShape(scene, rectangle({-1e3f, 1, -1e3f}, {0, 0, 2e3f}, {2e3f, 0, 0}),
+           addMaterial(scene, glass("thindielectric")));
   CHECK(seen(scene, 16, 1000, 2).mean() == 0);
   CHECK(seen(scene, 16, 1000, 3).mean() > 0);
 }

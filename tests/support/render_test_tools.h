@@ -119,7 +119,7 @@ class Moments {
     squares_ += d * (x - mean_);
   }
   double mean() const { return mean_; }
-  double error() const { return std::sqrt(squares_ / (n_ - 1.0) / n_); }
+  double error() const { return std::sqrt(std::max(0.0, squares_) / (n_ - 1.0) / n_); }
 
  private:
   double n_ = 0, mean_ = 0, squares_ = 0;

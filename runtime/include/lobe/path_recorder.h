@@ -74,6 +74,7 @@ class PathRecorder {
   PathRecorderOptions options_;
   std::array<Vertex, kMaxVertices> vertices_;
   int count_ = 0;
+  bool ignored_ = false;  // the last vertex was beyond kMaxVertices
 };
 
 }  // namespace lobe

@@ -19,7 +19,7 @@ float sampleTent(float u) {
 
 }  // namespace
 
-EnvironmentLight::EnvironmentLight(const Environment& environment)
+EnvironmentLight::EnvironmentLight(const Environment& environment, float subtract)
     : width_(environment.radiance.width), height_(environment.radiance.height), toWorld_(environment.toWorld) {
   std::vector<float> rowWeights;
   std::vector<float> weights(width_);
@@ -27,7 +27,7 @@ EnvironmentLight::EnvironmentLight(const Environment& environment)
     const float sine = std::sin(kPi * (y + 0.5f) / height_);
     for (int x = 0; x < width_; ++x) {
       const Rgb radiance = usable(environment.radiance.at(x, y));
-      weights[x] = luminance(radiance) * sine;
+      weights[x] = std::max(0.0f, luminance(radiance) - subtract) * sine;
       texels_.push_back({radiance.x(), radiance.y(), radiance.z(), weights[x]});
     }
     rows_.emplace_back(weights);
@@ -36,6 +36,15 @@ EnvironmentLight::EnvironmentLight(const Environment& environment)
   columns_ = DiscreteDistribution(rowWeights);
   const double pixelArea = 2.0 * kPi * kPi / static_cast<double>(texels_.size());
   flux_ = constant() ? 4.0 * kPi * luminance(texels_[0].head<3>()) : columns_.total() * pixelArea;
+}
+
+EnvironmentLight EnvironmentLight::forNextEventEstimation(const Environment& environment) {
+  EnvironmentLight plain(environment);
+  const double mean = plain.flux() / (4.0 * kPi);
+  if (plain.constant() || !std::isfinite(mean)) return plain;
+  EnvironmentLight compensated(environment, static_cast<float>(mean));
+  // Little is left of a nearly uniform environment, and its rounding errors would be sampled.
+  return compensated.flux() > 1e-3 * plain.flux() ? compensated : plain;
 }
 
 EnvironmentLight::Coordinates EnvironmentLight::coordinates(const Vec3& direction) const {

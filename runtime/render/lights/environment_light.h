@@ -23,8 +23,13 @@ struct PixelBlock {
 
 class EnvironmentLight {
  public:
-  /// Negative and non-finite values are treated as black.
-  explicit EnvironmentLight(const Environment& environment);
+  /// Negative and non-finite values are treated as black. `subtract` is subtracted from the luminance of every pixel
+  /// where directions are sampled, not from the radiance.
+  explicit EnvironmentLight(const Environment& environment, float subtract = 0);
+
+  /// The environment with a density for next-event estimation (MIS compensation, Karlík et al. 2019): directions below
+  /// the mean radiance are left to BSDF sampling. The same as the plain density if that leaves nothing.
+  static EnvironmentLight forNextEventEstimation(const Environment& environment);
 
   /// ∫ luminance dω by the quadrature of the pixel grid; 0 for a black environment.
   double flux() const { return flux_; }

@@ -104,6 +104,7 @@ Lights::Lights(const Scene& scene, const Eigen::AlignedBox3f& bounds)
   for (const DeltaLight& light : scene.lights) powers.push_back(powerOf(light, sphere_));
   if (scene.environment) {
     environment_.emplace(*scene.environment);
+    nextEvent_.emplace(EnvironmentLight::forNextEventEstimation(*scene.environment));
     powers.push_back(environment_->flux() * kPi * sphere_.radius * sphere_.radius);
   }
   choose(powers);
@@ -167,7 +168,7 @@ std::optional<LightSample> Lights::sampleArea(const AreaLight& light, const Vec3
 }
 
 std::optional<LightSample> Lights::sampleEnvironment(const Vec2& u) const {
-  const std::optional<EnvironmentSample> sample = environment_->sample(u);
+  const std::optional<EnvironmentSample> sample = nextEvent_->sample(u);
   if (!sample) return std::nullopt;
   return LightSample{sample->wi, kInfinity, sample->radiance, sample->pdf, std::nullopt};
 }
@@ -203,7 +204,7 @@ Rgb Lights::environmentRadiance(const Vec3& direction) const {
 
 float Lights::environmentPdf(const Vec3& direction) const {
   const float choice = environmentProbability();
-  return choice > 0.0f ? choice * environment_->pdf(direction) : 0.0f;
+  return choice > 0.0f ? choice * nextEvent_->pdf(direction) : 0.0f;
 }
 
 std::optional<EmittedPhoton> Lights::areaPhoton(const AreaLight& light, float choice, const Vec2& u1,

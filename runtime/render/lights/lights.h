@@ -17,7 +17,7 @@ struct LightSample {
   Vec3 wi;         ///< unit, world space, towards the light
   float distance;  ///< infinite for lights at infinity
   Rgb radiance;    ///< for a delta light, the irradiance on a surface that faces it
-  float pdf;       ///< over solid angle, with the choice of the light, > 0; for a delta light, of its choice only
+  float pdf;  ///< over solid angle, including the probability of choosing the light, > 0; for a delta light only that
   /// The point on the light (for a point light without normal and offset); nullopt for lights at infinity.
   std::optional<SurfacePoint> source;
   bool delta = false;  ///< a point or directional light: its multiple importance weight is 1
@@ -45,7 +45,7 @@ struct SceneSphere {
 
 class Lights {
  public:
-  /// The scene must outlive the lights. bounds: those of the scene's shapes.
+  /// The scene must outlive the lights. bounds: bounding box of the scene's shapes.
   Lights(const Scene& scene, const Eigen::AlignedBox3f& bounds);
 
   /// Whether there is no light; then nothing may be sampled.
@@ -53,7 +53,8 @@ class Lights {
 
   /// Chooses a light, then a direction towards it; choice uniform in [0,1), u in [0,1)². nullopt: a sample of value
   /// zero, for example if the point is behind the light. Spheres are sampled by solid angle from outside, other
-  /// surfaces by area, the environment by radiance.
+  /// surfaces by area, the environment by radiance above its mean: the rest is left to BSDF sampling, so that the two
+  /// have to be combined.
   std::optional<LightSample> sample(const Vec3& point, float choice, const Vec2& u) const;
 
   /// The density with which sample finds, from `point`, the direction towards `hit` on a light; 0 if the hit is not on
@@ -105,7 +106,8 @@ class Lights {
   std::vector<AreaLight> areas_;
   std::vector<int> lightOfShape_;  // index into areas_, −1: none
   std::optional<EnvironmentLight> environment_;
-  DiscreteDistribution choice_;  // areas_, then the scene's delta lights, then the environment
+  std::optional<EnvironmentLight> nextEvent_;  // with the density of next-event estimation
+  DiscreteDistribution choice_;                // areas_, then the scene's delta lights, then the environment
 };
 
 }  // namespace lobe

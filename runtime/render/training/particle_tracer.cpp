@@ -61,7 +61,7 @@ PhotonResult ParticleTracer::tracePhotons(int pass, int count) const {
   auto results = traceChunks<PhotonResult>(
       seed_, 2 * static_cast<std::uint64_t>(pass) + 1, count, [&](int i, Sampler& rng, PhotonResult& result) {
         if (const std::optional<EmittedPhoton> photon = emit(rng))
-          PhotonWalk(scene_, importance_, rng, result).run(*photon, kFirstPhoton + static_cast<std::uint64_t>(i));
+          PhotonWalk(scene_, importance_, rng, result).run(*photon, kFirstPhoton + static_cast<std::uint64_t>(i), count);
       });
   for (PhotonResult& result : results) {
     all.radiance.merge(std::move(result.radiance));

@@ -17,7 +17,8 @@ constexpr int kMaxBranchesOfPhoton = 512;
 
 }  // namespace
 
-void PhotonWalk::run(const EmittedPhoton& photon, std::uint64_t index) {
+void PhotonWalk::run(const EmittedPhoton& photon, std::uint64_t index, int photons) {
+  fluxScale_ = 1.0f / static_cast<float>(photons);
   result_.radiance.beginPath(index);
   result_.importance.beginPath(index);
   power_ = luminance(photon.power);
@@ -99,7 +100,7 @@ void PhotonWalk::store(const EmittedPhoton& photon, const Branch& branch, const 
                                straight && photon.far ? kInfinity
                                : straight             ? distance
                                                       : hit.distance,
-                               flux);
+                               flux * fluxScale_);
 }
 
 // Number of branches that continue. Below the window, Russian roulette may terminate the photon; above it the photon is

@@ -23,7 +23,8 @@ class PhotonWalk {
       : scene_(scene), importance_(importance), rng_(rng), result_(result) {}
 
   /// index: number of the path, passed to the sample storages.
-  void run(const EmittedPhoton& photon, std::uint64_t index);
+  /// photons: number of photons of the pass, of which this is one; it makes the flux that is stored independent of it.
+  void run(const EmittedPhoton& photon, std::uint64_t index, int photons = 1);
 
  private:
   /// How a photon came here from its light, while it has met delta components only.
@@ -51,6 +52,7 @@ class PhotonWalk {
   const GuidedSampler& importance_;
   Sampler& rng_;
   PhotonResult& result_;
+  float fluxScale_ = 1;
   float power_ = 0;  // emitted power, luminance
   std::vector<Branch> waiting_;
   int made_ = 0;  // number of branches made by splitting
