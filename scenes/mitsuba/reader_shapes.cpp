@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <exception>
-#include <ranges>
 
 #include <fmt/format.h>
 
@@ -271,7 +270,7 @@ void ShapeReader::readMeshes() {
   for (const Mesh& mesh : meshes_) reportFault(mesh);
   clearInstancesOutOfRange();
   // From the back, so that the indices of the remaining shapes stay valid.
-  for (const Mesh& mesh : std::views::reverse(meshes_)) dropEmpty(mesh);
+  for (std::size_t i = meshes_.size(); i-- > 0;) dropEmpty(meshes_[i]);
   std::erase_if(context_.scene.shapes, [](const Shape& shape) {
     const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry);
     return mesh && mesh->triangles.empty();

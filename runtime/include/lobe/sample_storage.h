@@ -32,7 +32,8 @@ class SampleStorage {
   /// weight: flux (luminance), ≥ 0, without the part that next-event estimation handles better.
   /// distance: world units travelled since the last vertex; +infinity for light from the environment.
   /// flux: total flux (luminance), ≥ 0, before subtracting the part handled by next-event estimation. The irradiance of
-  /// records is estimated from it: divide it by the number of photons of the pass, so that all passes use the same unit.
+  /// records is estimated from it: divide it by the number of photons of the pass, so that all passes use the same
+  /// unit.
   void addPhoton(const Float3& position, const Float3& normal, const Float3& direction, float weight, float distance,
                  float flux);
 

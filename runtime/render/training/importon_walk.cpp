@@ -37,7 +37,7 @@ bool ImportonWalk::goOn(const SurfaceHit& hit, const GuidedSampler::Vertex* vert
   if (!scattered) return false;
   state_.weight *= scattered->weight;
   state_.ray = spawnRay(hit, scattered->direction);
-  if (scattered->pdf > 0) {
+  if (vertex && scattered->pdf > 0) {
     emissionWeight_.scattered(hit.position, scattered->direction, scattered->pdf);
     remember(hit, *vertex, *scattered);
   } else {

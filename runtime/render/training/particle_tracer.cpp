@@ -58,11 +58,12 @@ ImportonResult ParticleTracer::traceImportons(int pass, int count, const Importo
 PhotonResult ParticleTracer::tracePhotons(int pass, int count) const {
   PhotonResult all;
   if (scene_.lights.empty()) return all;
-  auto results = traceChunks<PhotonResult>(
-      seed_, 2 * static_cast<std::uint64_t>(pass) + 1, count, [&](int i, Sampler& rng, PhotonResult& result) {
-        if (const std::optional<EmittedPhoton> photon = emit(rng))
-          PhotonWalk(scene_, importance_, rng, result).run(*photon, kFirstPhoton + static_cast<std::uint64_t>(i), count);
-      });
+  auto results = traceChunks<PhotonResult>(seed_, 2 * static_cast<std::uint64_t>(pass) + 1, count,
+                                           [&](int i, Sampler& rng, PhotonResult& result) {
+                                             if (const std::optional<EmittedPhoton> photon = emit(rng))
+                                               PhotonWalk(scene_, importance_, rng, result)
+                                                   .run(*photon, kFirstPhoton + static_cast<std::uint64_t>(i), count);
+                                           });
   for (PhotonResult& result : results) {
     all.radiance.merge(std::move(result.radiance));
     all.importance.merge(std::move(result.importance));
