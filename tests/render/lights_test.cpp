@@ -303,6 +303,12 @@ TEST_CASE("render: photons carry the same flux as light sampling") {
   SECTION("environment") {
     scene.environment = turnedSky();
   }
+  SECTION("environment of which next-event estimation samples a half") {
+    Image image(64, 32, grey(0.3f));
+    for (int y = 0; y < 32; ++y)
+      for (int x = 0; x < 32; ++x) image.at(x, y) = grey(1);
+    scene.environment = environment(image);
+  }
   SECTION("point") {
     scene.lights.push_back(PointLight{{0.5f, 1, 0.2f}, grey(2)});
   }
