@@ -127,9 +127,9 @@ class SampleTimer {
   double lazy(bool ahead) {
     return timed(ahead, [](const GaussiansView& one, const GaussiansView& two) { return Product(one, 0, two); });
   }
-  double allPairs(int lanes) {
+  double eager(int lanes) {
     return timed(false,
-                 [lanes](const GaussiansView& one, const GaussiansView& two) { return AllPairs(one, two, lanes); });
+                 [lanes](const GaussiansView& one, const GaussiansView& two) { return EagerProduct(one, two, lanes); });
   }
 
   /// Throws std::runtime_error unless both products give the same density.
@@ -141,7 +141,7 @@ class SampleTimer {
       const Vec2 y = product.sample(draws_[i].choice, draws_[i].u);
       for (const int lanes : {4, 8}) {
         if (two.stride % lanes != 0) continue;
-        const float ratio = AllPairs(one, two, lanes).pdf(y) / product.pdf(y);
+        const float ratio = EagerProduct(one, two, lanes).pdf(y) / product.pdf(y);
         if (!(std::abs(ratio - 1) < 1e-2f))
           throw std::runtime_error(
               fmt::format("the densities of eager and lazy product differ by a factor of {}", ratio));
@@ -239,13 +239,11 @@ struct LightSets {
 nlohmann::ordered_json row(int one, int two, const LightSets& lights, RayTimer& rays, const Options& o) {
   SampleTimer hot(one, lights.hot), cold(one, lights.cold);
   hot.check();
-  std::vector<Column> columns{{"hot", [&] { return hot.lazy(false); }},
-                              {"hot_all_pairs_4", [&] { return hot.allPairs(4); }},
-                              {"cold", [&] { return cold.lazy(false); }},
-                              {"cold_prefetched", [&] { return cold.lazy(true); }},
-                              {"cold_all_pairs_4", [&] { return cold.allPairs(4); }},
-                              {"ray", [&] { return rays.nanoseconds(); }}};
-  if (two > kPaddingMultiple) columns.push_back({"hot_all_pairs_8", [&] { return hot.allPairs(8); }});
+  std::vector<Column> columns{
+      {"hot", [&] { return hot.lazy(false); }},        {"hot_eager_4", [&] { return hot.eager(4); }},
+      {"cold", [&] { return cold.lazy(false); }},      {"cold_prefetched", [&] { return cold.lazy(true); }},
+      {"cold_eager_4", [&] { return cold.eager(4); }}, {"ray", [&] { return rays.nanoseconds(); }}};
+  if (two > kPaddingMultiple) columns.push_back({"hot_eager_8", [&] { return hot.eager(8); }});
   timeInTurns(columns, o.rounds);
   nlohmann::ordered_json json{{"reflectance", one}, {"light", two}};
   for (const Column& c : columns) json[c.name] = median(c.nanoseconds);

@@ -22,8 +22,9 @@ HWY_INLINE hn::Vec<D> formRow(D d, const GaussiansView& reflectance, int i, cons
   const auto one = [&](GaussianField f) { return hn::Set(d, reflectance.field(f)[i]); };
   const auto two = [&](GaussianField f) { return hn::LoadU(d, light.field(f) + first); };
   const auto to = [&](GaussianField f, hn::Vec<D> v) {
-    hn::StoreU(v, d,
-               out + static_cast<std::ptrdiff_t>(f) * AllPairs::kMostPairs + std::ptrdiff_t{i} * light.stride + first);
+    hn::StoreU(
+        v, d,
+        out + static_cast<std::ptrdiff_t>(f) * EagerProduct::kMostPairs + std::ptrdiff_t{i} * light.stride + first);
   };
   const auto half = hn::Set(d, -kHalfLog2e);
   const auto xx1 = one(GaussianField::xx), xx2 = two(GaussianField::xx);
@@ -76,7 +77,7 @@ HWY_INLINE float sumBy(D d, const float* pairs, int count, float px, float py) {
   auto total = hn::Zero(d);
   for (int k = 0; k < count; k += static_cast<int>(hn::Lanes(d))) {
     const auto at = [&](GaussianField f) {
-      return hn::LoadU(d, pairs + static_cast<std::ptrdiff_t>(f) * AllPairs::kMostPairs + k);
+      return hn::LoadU(d, pairs + static_cast<std::ptrdiff_t>(f) * EagerProduct::kMostPairs + k);
     };
     const auto dx = hn::Sub(x, at(GaussianField::x));
     const auto dy = hn::NegMulAdd(at(GaussianField::slope), dx, hn::Sub(y, at(GaussianField::y)));
@@ -108,12 +109,12 @@ HWY_EXPORT(formKernel);
 HWY_EXPORT(sumKernel);
 }  // namespace
 
-AllPairs::AllPairs(const GaussiansView& reflectance, const GaussiansView& light, int lanes)
+EagerProduct::EagerProduct(const GaussiansView& reflectance, const GaussiansView& light, int lanes)
     : lanes_(lanes),
       mass_(HWY_DYNAMIC_DISPATCH(formKernel)(reflectance, light, lanes, pairs_.data())),
       count_(reflectance.count * light.stride) {}
 
-Vec2 AllPairs::sample(float choice, const Vec2& u) const {
+Vec2 EagerProduct::sample(float choice, const Vec2& u) const {
   const GaussiansView view{pairs_.data(), kMostPairs, count_};
   const float* weights = view.field(GaussianField::weight);
   float left = choice * mass_;
@@ -122,7 +123,7 @@ Vec2 AllPairs::sample(float choice, const Vec2& u) const {
   return sampleLane(view, chosen, u);
 }
 
-float AllPairs::pdf(const Vec2& y) const {
+float EagerProduct::pdf(const Vec2& y) const {
   return HWY_DYNAMIC_DISPATCH(sumKernel)(pairs_.data(), count_, lanes_, y.x(), y.y()) / mass_;
 }
 

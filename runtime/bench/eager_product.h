@@ -9,12 +9,12 @@
 
 namespace lobe {
 
-class AllPairs {
+class EagerProduct {
  public:
   static constexpr int kMostPairs = 64;
 
   /// Factors as for Product, with up to kMostPairs pairs; the stride of the light is a multiple of lanes (4 or 8).
-  AllPairs(const GaussiansView& reflectance, const GaussiansView& light, int lanes);
+  EagerProduct(const GaussiansView& reflectance, const GaussiansView& light, int lanes);
 
   Vec2 sample(float choice, const Vec2& u) const;
   float pdf(const Vec2& y) const;

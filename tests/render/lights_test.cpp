@@ -1,5 +1,6 @@
 // Light sources: sampling, densities and photons.
 
+#include "materials/registry.h"
 #include "materials/textures/bitmap.h"
 #include "materials/textures/checkerboard.h"
 #include "runtime/render/lights/delta_lights.h"
@@ -205,6 +206,28 @@ TEST_CASE("render: the flux of delta lights agrees with closed forms at any scen
   const double root3 = std::sqrt(3.0);  // the bounding box's corner
   for (const float size : {1e-9f, 1.0f, 1e15f})
     CHECK(deviation(power(DirectionalLight{axis, grey(2)}, size), 2 * kPi * std::pow(root3 * size, 2)) < kMaxDeviation);
+}
+
+TEST_CASE("render: light of a point light that passes a pane is not learnt") {
+  // The floor is black, so that it sends no light back to the pane.
+  Scene scene;
+  addShape(scene, rectangle({-5, 0, -5}, {0, 0, 10}, {10, 0, 0}), addMaterial(scene, std::make_shared<Diffuse>(0.0f)));
+  Parameters glass;
+  glass.set("int_ior", 1.5);
+  glass.set("ext_ior", 1.0);
+  addShape(scene, rectangle({-5, 0.5f, -5}, {0, 0, 10}, {10, 0, 0}), addMaterial(scene, makeBsdf("dielectric", glass)));
+  const auto particles = [](const Scene& s) {
+    const RenderScene ready(s);
+    const Field nothing;
+    const GuidedSampler sampler(s, nothing, nullptr);
+    const RayCamera camera({}, {});
+    return ParticleTracer(ready, camera, sampler, sampler, nullptr, 1).tracePhotons(0, 2000).radiance.particles();
+  };
+  Scene lamp = scene;
+  scene.lights.push_back(PointLight{{0, 1, 0}, grey(1)});
+  CHECK(particles(scene) == 0);
+  addEmitter(lamp, Sphere{{0, 1, 0}, 0.1f}, 1);
+  CHECK(particles(lamp) > 100);
 }
 
 TEST_CASE("render: light that only next-event estimation samples is not learnt") {

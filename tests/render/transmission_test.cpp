@@ -105,6 +105,16 @@ TEST_CASE("transmission: next-event estimation through refraction agrees with pa
   CHECK(deviation(chance, one) < kMaxDeviation);
 }
 
+TEST_CASE("transmission: radiance is scaled by the square of the index where only one interface is passed") {
+  // The receiver is inside the glass.
+  Scene scene = smallReceiver();
+  scene.environment = withSun();
+  addShape(scene, box({-3, -1, -3}, {3, 1, 3}, false), addMaterial(scene, glass("dielectric")));
+  const Moments chance = seen(scene, 0, 400000), followed = seen(scene, 16, 400000);
+  CHECK(deviation(chance, followed) < kMaxDeviation);
+  CHECK(followed.error() < 0.7 * chance.error());
+}
+
 TEST_CASE("transmission: area lights are found through panes and half-open masks") {
   const char* type = GENERATE("thindielectric", "mask", "dielectric");
   CAPTURE(type);

@@ -52,7 +52,7 @@ class Studio {
   PathIntegrator path() const { return {*renderScene_, {}}; }
   GuidedIntegrator guided() const { return {*renderScene_, {}, *guided_}; }
   GuidedIntegrator product() const { return {*renderScene_, {}, *product_}; }
-  GuidedIntegrator plainProduct() const {
+  GuidedIntegrator productWithThroughputRoulette() const {
     PathOptions options;
     options.russianRoulette = RussianRoulette::throughput;
     return {*renderScene_, options, *product_};

@@ -76,7 +76,7 @@ TEST_CASE("unbiased: all integrators agree on the demo scene", "[slow]") {
   const auto path = blocks(studio.render(studio.path(), 2 * samples, 1), size);
   CHECK(agree(path, blocks(studio.render(studio.guided(), samples, 2), size)));
   CHECK(agree(path, blocks(studio.render(studio.product(), samples, 3), size)));
-  CHECK(agree(path, blocks(studio.render(studio.plainProduct(), samples, 5), size)));
+  CHECK(agree(path, blocks(studio.render(studio.productWithThroughputRoulette(), samples, 5), size)));
   CHECK_FALSE(agree(path, blocks(studio.render(WrongIntegrator(studio), samples, 4), size)));
 }
 
@@ -88,8 +88,9 @@ TEST_CASE("unbiased: radiance in an emissive box is emission over absorption", "
       <bsdf type="diffuse"><rgb name="reflectance" value="0.6, 0.6, 0.6"/></bsdf>
       <emitter type="area"><rgb name="radiance" value="0.8, 0.8, 0.8"/></emitter></shape></scene>)";
   const Studio studio(readScene(folder / "furnace.xml"), 30, 20);
-  for (const auto& film : {studio.render(studio.path(), 256, 6), studio.render(studio.guided(), 256, 7),
-                           studio.render(studio.plainProduct(), 256, 9), studio.render(studio.product(), 256, 8)}) {
+  for (const auto& film :
+       {studio.render(studio.path(), 256, 6), studio.render(studio.guided(), 256, 7),
+        studio.render(studio.productWithThroughputRoulette(), 256, 9), studio.render(studio.product(), 256, 8)}) {
     const auto found = blocks(film, 5);
     CHECK(agree(found, exactly(2.0, found.size())));
   }

@@ -183,10 +183,11 @@ class PathLoop {
     if (!sidesAgree(hit, light->wi, wi)) return;
     const Rgb f = evalBsdf(hit, wi);
     if (!(f.maxCoeff() > 0.0f)) return;
-    const Rgb arriving = scene_.arriving(hit, *light, options_.maxDepth - path.depth - 1, path.statistics.shadowRays);
-    if (!(arriving.maxCoeff() > 0.0f)) return;
+    const ArrivingLight arriving = scene_.arriving(hit, *light, options_.maxDepth - path.depth - 1);
+    path.statistics.shadowRays += static_cast<std::uint64_t>(arriving.rays);
+    if (!(arriving.radiance.maxCoeff() > 0.0f)) return;
     const float weight = light->delta ? 1.0f : misWeight(light->pdf, fraction * vertex.pdf(wi));
-    path.radiance += path.throughput * f * arriving * (std::abs(wi.z()) * weight / light->pdf);
+    path.radiance += path.throughput * f * arriving.radiance * (std::abs(wi.z()) * weight / light->pdf);
   }
 
   bool scatterSmooth(Path& path, const SurfaceHit& hit, const typename Guide::Vertex& vertex, float fraction) const {

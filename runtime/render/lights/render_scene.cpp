@@ -49,34 +49,40 @@ TransmittedRay RenderScene::follow(Ray ray, int maxSurfaces, const Vec3* target)
   }
 }
 
-Rgb RenderScene::arriving(const SurfacePoint& from, const LightSample& light, int maxSurfaces,
-                          std::uint64_t& rays) const {
-  ++rays;
+ArrivingLight RenderScene::arriving(const SurfacePoint& from, const LightSample& light, int maxSurfaces) const {
+  ArrivingLight result;
+  result.last = spawnRay(from, light.wi);
   const int most = std::min(shadowSurfaces, maxSurfaces);
-  if (most <= 0) return visible(from, light) ? light.radiance : Rgb(Rgb::Zero());
-  Ray ray = spawnRay(from, light.wi);
+  if (most <= 0) {
+    if (visible(from, light)) result.radiance = light.radiance;
+    return result;
+  }
   TransmittedRay end;
   if (light.source) {
     const Vec3 target = offsetPoint(*light.source, -light.wi);
-    const Vec3 segment = target - ray.origin;
+    const Vec3 segment = target - result.last.origin;
     const float length = segment.norm();
-    if (!(length > 0)) return light.radiance;
-    ray = {ray.origin, segment / length, length * kBeforeLight};
-    end = follow(ray, most, &target);
+    if (!(length > 0)) return result;
+    end = follow({result.last.origin, segment / length, length * kBeforeLight}, most, &target);
   } else {
-    end = follow(ray, most);
+    end = follow(result.last, most);
   }
-  rays += static_cast<std::uint64_t>(end.surfaces);
+  result.rays += end.surfaces;
+  result.last = end.last;
   // A directional light is not found along a direction that was changed.
-  if (end.hit || (end.bent && light.delta)) return Rgb::Zero();
-  return end.transmittance * (end.bent ? lights.environmentRadiance(end.last.direction) : light.radiance);
+  if (!end.hit && !(end.bent && light.delta))
+    result.radiance = end.transmittance * (end.bent ? lights.environmentRadiance(end.last.direction) : light.radiance);
+  return result;
+}
+
+std::optional<DeltaTransmission> sharedTransmission(const SurfaceHit& hit, const Vec3& wi) {
+  return wi.z() * hit.wo.z() < 0 ? deltaTransmission(hit) : std::nullopt;
 }
 
 void EmissionWeight::passed(const SurfaceHit& hit, const Vec3& wi, int shadowSurfaces) {
-  const bool transmitted = wi.z() * hit.wo.z() < 0;
-  const std::optional<DeltaTransmission> through =
-      pdf_ > 0 && transmitted && ++surfaces_ <= shadowSurfaces ? deltaTransmission(hit) : std::nullopt;
-  if (!through)
+  if (pdf_ <= 0) return;
+  const std::optional<DeltaTransmission> through = sharedTransmission(hit, wi);
+  if (!through || ++surfaces_ > shadowSurfaces)
     pdf_ = 0;
   else
     bent_ = bent_ || !through->straight;

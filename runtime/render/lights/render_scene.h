@@ -16,6 +16,13 @@ struct TransmittedRay {
   bool bent = false;  ///< at least one surface changed the direction
 };
 
+/// Light that reaches a point from a light sample.
+struct ArrivingLight {
+  Rgb radiance = Rgb::Zero();  ///< for a delta light, its irradiance; zero if the light is blocked
+  Ray last;                    ///< the last segment of the way to the light; unit direction
+  int rays = 1;                ///< traced
+};
+
 struct RenderScene {
   static constexpr int kDefaultShadowSurfaces = 16;
 
@@ -27,11 +34,11 @@ struct RenderScene {
   /// a finite tfar ends at `target`, which it must point to, and at the first surface that would change its direction.
   TransmittedRay follow(Ray ray, int maxSurfaces, const Vec3* target = nullptr) const;
 
-  /// The radiance of a light sample (for a delta light, its irradiance) that arrives at `from.position` from light.wi:
-  /// zero if it is blocked. It passes up to min(shadowSurfaces, maxSurfaces) surfaces by delta transmission. Light from
-  /// the environment may be refracted, and has the radiance of the direction in which the ray leaves the scene; light
-  /// from other emitters passes only where its direction stays the same. Adds the rays traced to `rays`.
-  Rgb arriving(const SurfacePoint& from, const LightSample& light, int maxSurfaces, std::uint64_t& rays) const;
+  /// The light of a sample that arrives at `from.position` from light.wi. It passes up to min(shadowSurfaces,
+  /// maxSurfaces) surfaces by delta transmission. Light from the environment may be refracted, and has the radiance of
+  /// the direction in which the ray leaves the scene; light from other emitters passes only where its direction stays
+  /// the same.
+  ArrivingLight arriving(const SurfacePoint& from, const LightSample& light, int maxSurfaces) const;
 
   /// Whether a light sample taken at `from.position` is unoccluded; surfaces that transmit light occlude, too.
   bool visible(const SurfacePoint& from, const LightSample& light) const;
@@ -48,8 +55,13 @@ inline float misWeight(float own, float other) {
   return 1.0f / (1.0f + ratio * ratio);
 }
 
-/// What weighs the emission that a path finds against next-event estimation at the last vertex that scattered it:
-/// there, next-event estimation samples the same direction, and follows the same delta transmissions.
+/// The transmission that next-event estimation follows at a surface, if a path that continues in the direction wi
+/// (local in hit.frame) by a delta component follows it, too. nullopt: the path takes another way.
+std::optional<DeltaTransmission> sharedTransmission(const SurfaceHit& hit, const Vec3& wi);
+
+/// The multiple importance weight of the emission that a path finds, against next-event estimation at the last vertex
+/// that scattered the path: there, next-event estimation samples the same direction, and follows the same delta
+/// transmissions.
 class EmissionWeight {
  public:
   /// The path was scattered into a direction (world space) with a density over solid angle.
@@ -60,7 +72,7 @@ class EmissionWeight {
     surfaces_ = 0;
     bent_ = false;
   }
-  /// The path went on by a delta component, in a direction that is local in hit.frame.
+  /// The path continued by a delta component, in a direction that is local in hit.frame.
   void passed(const SurfaceHit& hit, const Vec3& wi, int shadowSurfaces);
 
   float ofEnvironment(const Lights& lights) const {

@@ -75,22 +75,14 @@ void ImportonWalk::addDirectLight(const SurfaceHit& hit, const GuidedSampler::Ve
   const Rgb value = state_.weight * evalBsdf(hit, wi) * (std::abs(wi.z()) / light->pdf);
   if (!usable(luminance(value))) return;
   const float weight = light->delta ? 1.0f : misWeight(light->pdf, smoothFraction * vertex.pdf(wi));
+  const ArrivingLight arriving = scene_.arriving(hit, *light, kMaxTrainingDepth);
+  const Rgb found = value * weight * arriving.radiance;
+  collect(found);
+  // Where photons of this light enter the scene. Light at the first surface is left to the renderer's next-event
+  // estimation.
   const bool fromEnvironment = !light->source && !light->delta;
-  if (fromEnvironment && wishes_.uses) return addEnvironmentLight(hit, *light, value * weight);
-  std::uint64_t rays = 0;
-  collect(value * weight * scene_.arriving(hit, *light, kMaxTrainingDepth, rays));
-}
-
-// As RenderScene::arriving, and tells where photons of this light enter the scene. Light at the first surface is left
-// to the renderer's next-event estimation.
-void ImportonWalk::addEnvironmentLight(const SurfaceHit& hit, const LightSample& light, const Rgb& throughput) {
-  const TransmittedRay end = scene_.follow(spawnRay(hit, light.wi), scene_.shadowSurfaces);
-  if (end.hit) return;
-  const Rgb value = throughput * end.transmittance *
-                    (end.bent ? scene_.lights.environmentRadiance(end.last.direction) : light.radiance);
-  collect(value);
-  const float weight = luminance(value);
-  if (depth_ > 1 && usable(weight)) result_.uses.push_back({end.last.origin, end.last.direction, weight});
+  if (wishes_.uses && fromEnvironment && depth_ > 1 && usable(luminance(found)))
+    result_.uses.push_back({arriving.last.origin, arriving.last.direction, luminance(found)});
 }
 
 void ImportonWalk::remember(const SurfaceHit& hit, const GuidedSampler::Vertex& vertex, const Scattered& scattered) {

@@ -55,7 +55,6 @@ class ImportonWalk {
   void arrive(const SurfaceHit& hit);
   void escape();
   void addDirectLight(const SurfaceHit& hit, const GuidedSampler::Vertex& vertex, float smoothFraction);
-  void addEnvironmentLight(const SurfaceHit& hit, const LightSample& light, const Rgb& throughput);
   void collect(const Rgb& light) { recorder_.addLight(asFloats(light)); }
   void remember(const SurfaceHit& hit, const GuidedSampler::Vertex& vertex, const Scattered& scattered);
 

@@ -62,8 +62,7 @@ PhotonWalk::Passage PhotonWalk::passageAfter(const Branch& branch, const Surface
   Passage passage = branch.passage;
   passage.specular = passage.specular && scattered.pdf == 0;
   if (!passage.specular || !passage.followed) return passage;
-  const bool transmitted = scattered.wi.z() * hit.wo.z() < 0;
-  const std::optional<DeltaTransmission> through = transmitted ? deltaTransmission(hit) : std::nullopt;
+  const std::optional<DeltaTransmission> through = sharedTransmission(hit, scattered.wi);
   passage.followed = through && ++passage.surfaces <= scene_.shadowSurfaces;
   passage.bent = passage.bent || !through || !through->straight;
   passage.distance += hit.distance;
