@@ -2,6 +2,9 @@
 // The random numbers of one path: low-discrepancy points for the dimensions that matter most, independent numbers for
 // the others.
 
+#include <algorithm>
+#include <cstdint>
+
 #include "runtime/core/random.h"
 #include "runtime/core/sobol.h"
 
@@ -25,6 +28,21 @@ class Sampler {
     sampler.scramble_ = Rng(seed, pixel).next();
     return sampler;
   }
+
+  /// A sampler for a further branch of the path, which starts at the same dimension: its numbers are independent of
+  /// those of this sampler, and stratified among the k-th branches that the samples of a pixel make at this dimension.
+  Sampler branch() {
+    Sampler result = *this;
+    const std::uint64_t seed = rng_.next();
+    result.rng_ = Rng((seed << 32) | rng_.next());
+    result.scramble_ =
+        mixed(scramble_ + 0x9e3779b9u * static_cast<std::uint32_t>(++branches_ * kSobolDimensions + dimension_ + 1));
+    result.branches_ = 0;
+    return result;
+  }
+
+  /// Leaves out stratified numbers, so that the others keep their dimensions.
+  void skip(int count) { dimension_ = std::min(dimension_ + count, kSobolDimensions); }
 
   /// Independent of all other numbers. For decisions such as Russian roulette.
   float uniform() { return rng_.uniform(); }
@@ -53,6 +71,7 @@ class Sampler {
 
   Rng rng_;
   int dimension_;
+  int branches_ = 0;  // made so far
   std::uint32_t index_, scramble_;
 };
 

@@ -99,6 +99,10 @@ const SurfaceDistribution::Impl& SurfaceDistribution::impl() const {
   return *std::launder(reinterpret_cast<const Impl*>(storage_));
 }
 
+std::uint32_t SurfaceDistribution::recordIndex() const {
+  return impl().record->index;
+}
+
 void SurfaceDistribution::describe(const SurfaceReflectance& reflectance, const LobeCacheSet* caches) {
   if (!hasRecord_) return;
   Impl& self = impl();

@@ -33,7 +33,7 @@ const std::vector<std::string> kFractionsNames{"fixed", "learnt"};
 // The old names are accepted in version 0.2 only.
 const std::vector<RenamedOption> kRenamedOptions{
     {"--shares", "--bsdf-fraction"},
-    {"--termination", "--russian-roulette", {{"plain", "throughput"}, {"window", "adjoint"}}},
+    {"--termination", "--russian-roulette", {{"plain", "throughput"}, {"window", "efficiency"}}},
 };
 
 struct Options {
@@ -116,12 +116,12 @@ void declare(CLI::App& app, Options& options) {
       ->capture_default_str();
   app.add_option(
          "--russian-roulette", job.russianRoulette,
-         "Russian roulette by throughput, or adjoint-driven Russian roulette and splitting (guided and product)")
+         "Russian roulette by throughput, or efficiency-aware Russian roulette and splitting (guided and product)")
       ->transform(
           CLI::CheckedTransformer(std::map<std::string, RussianRoulette>{{"throughput", RussianRoulette::throughput},
-                                                                         {"adjoint", RussianRoulette::adjoint}})
-              .description("{throughput,adjoint}"))
-      ->default_str("adjoint");
+                                                                         {"efficiency", RussianRoulette::efficiency}})
+              .description("{throughput,efficiency}"))
+      ->default_str("efficiency");
   app.add_option("--shadow-surfaces", job.shadowSurfaces,
                  "Number of glass, mask or null surfaces that next-event estimation sees through (0: none)")
       ->check(CLI::Range(0, 1000))

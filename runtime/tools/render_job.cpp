@@ -23,6 +23,7 @@
 #include "runtime/core/stopwatch.h"
 #include "runtime/image/error_metrics.h"
 #include "runtime/image/image_output.h"
+#include "runtime/render/integrators/learn_sample_counts.h"
 #include "runtime/render/integrators/path_integrator.h"
 #include "runtime/render/integrators/renderer.h"
 #include "runtime/tools/stored_illumination.h"
@@ -142,7 +143,10 @@ struct Guiding {
   std::optional<LobeCacheSet> caches;
   TrainedIllumination training;
   std::optional<GuidedSampler> sampler;
+  std::optional<SampleCountModel> counts;
+  double secondsCounts = 0;  ///< time for learning the counts
 
+  double seconds() const { return training.report.seconds + secondsCounts; }
   const LobeCacheSet* cachesOrNull() const { return caches ? &*caches : nullptr; }
   std::size_t unreducedBytes = 0;  ///< size of the records before merging
 
@@ -159,7 +163,7 @@ struct RunResult {
   std::uint64_t dropped;
 
   const TrainingReport& training() const { return guiding.training.report; }
-  double seconds() const { return training().seconds + render.total.seconds; }
+  double seconds() const { return guiding.seconds() + render.total.seconds; }
 };
 
 /// Times of the steps before training, in seconds.
@@ -201,6 +205,7 @@ nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, c
           {"seconds_restoring_illumination", load.restoring},
           {"seconds_total", run.seconds()},
           {"seconds_training", run.training().seconds},
+          {"seconds_sample_counts", run.guiding.secondsCounts},
           {"seconds_rendering", total.seconds},
           {"spp", total.samples},
           {"rays", paths.rays()},
@@ -279,12 +284,32 @@ void drawRecord(const RenderJob& job, const RenderScene& scene, const Receiver& 
   training.particles = {};  // not needed any more; frees memory for rendering
 }
 
-std::unique_ptr<Integrator> makeIntegrator(const RenderJob& job, const RenderScene& scene, const Guiding& guiding) {
+/// Learning the counts of samples takes a few percent of the time for rendering.
+int pathsForSampleCounts(const RenderJob& job, const RayCamera& camera) {
+  constexpr double kFraction = 0.05, kPathsPerSecond = 3000, kFewest = 20000, kMost = 150000;
+  const double wanted =
+      job.seconds ? kPathsPerSecond * *job.seconds : kFraction * *job.samples * camera.width() * camera.height();
+  return static_cast<int>(std::clamp(wanted, kFewest, kMost));
+}
+
+void learnCounts(const RenderJob& job, const RenderScene& scene, const RayCamera& camera, const PathOptions& options,
+                 Guiding& guiding) {
+  const Stopwatch watch;
+  guiding.counts = learnSampleCounts(scene, camera, options, *guiding.sampler, guiding.training.field.records(),
+                                     pathsForSampleCounts(job, camera), job.seed);
+  guiding.secondsCounts = watch.seconds();
+}
+
+std::unique_ptr<Integrator> makeIntegrator(const RenderJob& job, const RenderScene& scene, const RayCamera& camera,
+                                           Guiding& guiding) {
   PathOptions options;
   if (const std::optional<int> depth = job.maxDepth ? job.maxDepth : scene.scene.maxDepth) options.maxDepth = *depth;
   options.emitterVisibility = scene.scene.emitterVisibility;
-  options.russianRoulette = job.russianRoulette;
   if (!guiding.sampler) return std::make_unique<PathIntegrator>(scene, options);
+  if (job.russianRoulette == RussianRoulette::efficiency) {
+    learnCounts(job, scene, camera, options, guiding);
+    options.counts = &*guiding.counts;
+  }
   return std::make_unique<GuidedIntegrator>(scene, options, *guiding.sampler);
 }
 
@@ -388,10 +413,9 @@ void run(const RenderJob& job) {
   }
   if (receiver) drawRecord(job, renderScene, *receiver, guiding.training);
 
-  const std::unique_ptr<Integrator> integrator = makeIntegrator(job, renderScene, guiding);
+  const std::unique_ptr<Integrator> integrator = makeIntegrator(job, renderScene, camera, guiding);
   Film film(camera.width(), camera.height());
-  const RenderResult rendered =
-      renderWithProgress(job, camera, *integrator, guiding.training.report.seconds, film, log);
+  const RenderResult rendered = renderWithProgress(job, camera, *integrator, guiding.seconds(), film, log);
   const RunResult result{rendered, guiding, film.dropped()};
   if (result.dropped > 0)
     printWarning(kTool, fmt::format("{} samples were negative or not finite, and were discarded", result.dropped));

@@ -17,6 +17,9 @@ namespace lobe {
 
 enum class IntegratorKind { path, guided, product };
 
+/// Russian roulette by the path's throughput, or efficiency-aware Russian roulette and splitting (sample_counts.h).
+enum class RussianRoulette { throughput, efficiency };
+
 struct RenderJob {
   std::filesystem::path scene;
   std::map<std::string, std::string> definitions;
@@ -32,7 +35,7 @@ struct RenderJob {
   std::optional<int> maxDepth;  ///< in segments; empty: max_depth of the scene, or no limit
   int shadowSurfaces = RenderScene::kDefaultShadowSurfaces;
   PixelSampling sampling = PixelSampling::sobol;
-  RussianRoulette russianRoulette = RussianRoulette::adjoint;
+  RussianRoulette russianRoulette = RussianRoulette::efficiency;
   std::uint64_t seed = 1;
   float reduction = 0;  ///< maximum cost of merging the mixtures of both factors (Runnalls 2007); 0: no merging
   TrainingPlan training;

@@ -5,6 +5,7 @@
 
 #include "fitter/compile.h"
 #include "runtime/guiding/field_data.h"
+#include "runtime/render/integrators/learn_sample_counts.h"
 #include "runtime/render/integrators/path_integrator.h"
 #include "runtime/render/integrators/renderer.h"
 #include "runtime/render/training/training.h"
@@ -41,6 +42,7 @@ class Studio {
     illumination_ = trainIllumination(*renderScene_, *camera_, &*caches_, plan).field;
     guided_.emplace(scene_, illumination_, nullptr);
     product_.emplace(scene_, illumination_, &*caches_);
+    counts_ = learnSampleCounts(*renderScene_, *camera_, {}, *product_, illumination_.records(), 5000, 6);
   }
 
   Film render(const Integrator& integrator, int samples, std::uint64_t seed) const {
@@ -52,9 +54,9 @@ class Studio {
   PathIntegrator path() const { return {*renderScene_, {}}; }
   GuidedIntegrator guided() const { return {*renderScene_, {}, *guided_}; }
   GuidedIntegrator product() const { return {*renderScene_, {}, *product_}; }
-  GuidedIntegrator productWithThroughputRoulette() const {
+  GuidedIntegrator productWithCounts() const {
     PathOptions options;
-    options.russianRoulette = RussianRoulette::throughput;
+    options.counts = &*counts_;
     return {*renderScene_, options, *product_};
   }
   const RenderScene& renderScene() const { return *renderScene_; }
@@ -71,6 +73,7 @@ class Studio {
   std::optional<LobeCacheSet> caches_;
   Field illumination_;
   std::optional<GuidedSampler> guided_, product_;
+  std::optional<SampleCountModel> counts_;
 };
 
 }  // namespace lobe::test

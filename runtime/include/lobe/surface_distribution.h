@@ -100,6 +100,8 @@ class SurfaceDistribution {
 
   /// Whether a record serves the point.
   bool hasRecord() const { return hasRecord_; }
+  /// Index of the record in the field, below Field::records(). Requires hasRecord().
+  std::uint32_t recordIndex() const;
 
   /// Sets the reflectance and prepares sampling. Must be called exactly once if hasRecord(), and not otherwise.
   /// `caches` is the cache set that the lobes' indices refer to; nullptr disables the product, so that directions are
@@ -123,7 +125,7 @@ class SurfaceDistribution {
   float guidedPdf(const Float3& wi) const;
 
   /// Estimates the reflected radiance towards wo (luminance, up to a factor that is the same for all points of a
-  /// field), for adjoint-driven Russian roulette and splitting (Vorba and Křivánek 2016). albedo: luminance of the
+  /// field), for Russian roulette and splitting (Vorba and Křivánek 2016, Rath et al. 2022). albedo: luminance of the
   /// albedo of the whole BSDF, used if describe was called without caches. nullopt if no estimate is available: without
   /// a record, if undescribedFraction > 0, or if training used no photons, from which the irradiance is estimated.
   std::optional<float> reflectedRadiance(float albedo) const;

@@ -72,11 +72,13 @@ float GuidedSampler::Vertex::pdf(const Vec3& wi) const {
   return probability < 1 ? probability * bsdf + distribution_.guidedPdf(asFloats(wi)) : bsdf;
 }
 
-std::optional<float> GuidedSampler::Vertex::reflectedRadiance() const {
+std::optional<VertexEstimate> GuidedSampler::Vertex::estimate() const {
   // Transmitted light is not estimated.
   if (!distribution_.hasRecord() || hit_.bsdf->transmits()) return std::nullopt;
   const float albedo = sampler_.caches_ ? 0.0f : luminance(hit_.bsdf->albedo(hit_.wo, hit_.uv));
-  return distribution_.reflectedRadiance(albedo);
+  const std::optional<float> radiance = distribution_.reflectedRadiance(albedo);
+  if (!radiance) return std::nullopt;
+  return VertexEstimate{*radiance, distribution_.recordIndex()};
 }
 
 Rgb GuidedIntegrator::radiance(const Ray& ray, Sampler& rng, PathStatistics& statistics) const {

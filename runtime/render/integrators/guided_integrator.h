@@ -27,7 +27,7 @@ class GuidedSampler {
 
     std::optional<BsdfSample> sample(Sampler& rng, PathStatistics& statistics) const;
     float pdf(const Vec3& wi) const;
-    std::optional<float> reflectedRadiance() const;
+    std::optional<VertexEstimate> estimate() const;
     const SurfaceDistribution& distribution() const { return distribution_; }
 
    private:

@@ -29,6 +29,8 @@ struct PathStatistics {
   void countDelta() { ++strategies.back(); }
   void count(GuidingDecision decision) { ++decisions[static_cast<std::size_t>(decision)]; }
   std::uint64_t rays() const { return segments + shadowRays; }
+  /// Work in units of one segment: its ray, its surface and the sampling there. A shadow ray takes about half of that.
+  double cost() const { return static_cast<double>(segments) + 0.5 * static_cast<double>(shadowRays); }
 
   PathStatistics& operator+=(const PathStatistics& other) {
     paths += other.paths;

@@ -17,7 +17,7 @@ struct BsdfSampler {
     }
     float pdf(const Vec3& wi) const { return hit_.bsdf->pdf(hit_.wo, wi, hit_.uv); }
 
-    static std::optional<float> reflectedRadiance() { return std::nullopt; }
+    static std::optional<VertexEstimate> estimate() { return std::nullopt; }
 
    private:
     const SurfaceHit& hit_;

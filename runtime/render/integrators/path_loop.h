@@ -14,9 +14,8 @@
 //       std::optional<BsdfSample> sample(Sampler& rng, PathStatistics& statistics) const;
 //       // The density of sample over solid angle.
 //       float pdf(const Vec3& wi) const;
-//       // Estimate of the radiance reflected towards wo, luminance, in units that all vertices share; nullopt:
-//       // unknown.
-//       std::optional<float> reflectedRadiance() const;
+//       // Decides on the counts of samples, see sample_counts.h; nullopt: unknown.
+//       std::optional<VertexEstimate> estimate() const;
 //     };
 //   };
 //
@@ -29,34 +28,26 @@
 #include <optional>
 
 #include "runtime/render/integrators/integrator.h"
+#include "runtime/render/integrators/sample_counts.h"
 #include "runtime/render/lights/render_scene.h"
 
 namespace lobe {
 
-/// Russian roulette by the path's throughput, or adjoint-driven: Russian roulette and splitting keep each path's
-/// expected contribution near the estimate at its first vertex (Vorba and Křivánek 2016, "Adjoint-Driven Russian
-/// Roulette and Splitting"). The paper compares with an estimate of the pixel instead; the estimate at the first vertex
-/// has the same units and errors as those at later vertices. Vertices without an estimate use the throughput.
-enum class RussianRoulette { throughput, adjoint };
-
 struct PathOptions {
   int maxDepth = std::numeric_limits<int>::max();  ///< segments: 1 shows emitters only, 2 adds direct light
   int rouletteDepth = 5;                           ///< segments before Russian roulette applies
-  RussianRoulette russianRoulette = RussianRoulette::adjoint;
+  /// Counts of samples at vertices with an estimate, as far as the path is not at its first vertex: there, samples of
+  /// the pixel are stratified, and more of them are worth more than splitting. Null, and without an estimate: Russian
+  /// roulette by throughput.
+  const SampleCountModel* counts = nullptr;
   EmitterVisibility emitterVisibility = EmitterVisibility::shown;
 };
 
 /// Upper bound of the survival probability once Russian roulette applies, so that every path ends.
 inline constexpr float kMaxSurvival = 0.95f;
 
-/// Bounds of the weight window, for the ratio of expected contribution and reference: their ratio is 5 and their mean 1
-/// (Vorba and Křivánek 2016, Eq. 6).
-inline constexpr float kWeightWindowLow = 1.0f / 3.0f, kWeightWindowHigh = 5.0f / 3.0f;
-/// Lower bound of the survival probability: estimates may be far too low, and the throughput of survivors is divided by
-/// it.
-inline constexpr float kLeastSurvival = 0.2f;
 /// Upper bound of the branches that splitting makes of one camera path.
-inline constexpr int kMaxBranches = 16;
+inline constexpr float kMaxBranches = 16;
 
 template <class Guide>
 class PathLoop {
@@ -65,25 +56,35 @@ class PathLoop {
       : scene_(scene), options_(options), sampler_(sampler) {}
 
   Rgb radiance(const Ray& cameraRay, Sampler& rng, PathStatistics& statistics) const {
-    Path path{cameraRay, rng, statistics};
+    Path path{cameraRay, &rng, &statistics};
     ++statistics.paths;
     follow(path);
     return path.radiance;
   }
 
+  /// Traces a path without counts, and appends it to the log.
+  void log(const Ray& cameraRay, Sampler& rng, PathLog& log) const {
+    PathStatistics statistics;
+    Path path{cameraRay, &rng, &statistics};
+    path.log = &log;
+    follow(path);
+    log.paths.push_back({log.vertices.size(), luminance(path.radiance), static_cast<float>(statistics.cost())});
+  }
+
  private:
   struct Path {
     Ray ray;
-    Sampler& rng;
-    PathStatistics& statistics;
+    Sampler* rng;
+    PathStatistics* statistics;
     Rgb radiance = Rgb::Zero();
     Rgb throughput = Rgb::Ones();
     EmissionWeight emissionWeight = {};
     Rgb expected = Rgb::Ones();  // product of the albedos: the expected throughput, whatever was sampled
     float eta2 = 1;              // scaling of radiance by refraction so far, which Russian roulette undoes
     int depth = 0;
-    float reference = 0;  // expected contribution at the first vertex with an estimate; 0: none yet
-    int branches = 1;     // into which the camera path has been split so far
+    float reference = 0;  // SampleCountModel::reference; 0: no vertex had an estimate yet
+    float branches = 1;   // expected number into which the camera path has been split so far
+    PathLog* log = nullptr;
   };
 
   void follow(Path& path) const {
@@ -93,7 +94,7 @@ class PathLoop {
 
   // Traces one segment and processes its end point; returns false when the path ends.
   bool advance(Path& path) const {
-    ++path.statistics.segments;
+    ++path.statistics->segments;
     const bool dark = path.depth == 1 && options_.emitterVisibility != EmitterVisibility::shown;
     const std::optional<SurfaceHit> hit = dark ? firstVisible(path) : scene_.tracer.trace(path.ray);
     if (!hit) {
@@ -115,7 +116,7 @@ class PathLoop {
       if (!hit || !hit->emitter || options_.emitterVisibility == EmitterVisibility::dark) return hit;
       path.ray.tfar -= hit->distance;
       path.ray.origin = offsetPoint(*hit, path.ray.direction);
-      ++path.statistics.segments;
+      ++path.statistics->segments;
     }
   }
 
@@ -129,38 +130,72 @@ class PathLoop {
   }
 
   static bool survives(Path& path, float survival) {
-    if (path.rng.uniform() >= survival) return false;
+    if (path.rng->uniform() >= survival) return false;
     path.throughput /= survival;
     return true;
   }
 
-  // Number of branches that continue from the vertex; 0 if the path ends here.
-  int continuations(Path& path, const typename Guide::Vertex& vertex) const {
-    const std::optional<float> leaving =
-        options_.russianRoulette == RussianRoulette::adjoint ? vertex.reflectedRadiance() : std::nullopt;
-    const float expected = leaving ? luminance(path.throughput) * *leaving : 0.0f;
-    if (!leaving || !std::isfinite(expected)) return survivesByThroughput(path) ? 1 : 0;
-    if (path.reference <= 0) path.reference = expected;
-    const float ratio = path.reference > 0 ? expected / path.reference : 1.0f;
+  // The counts at the vertex; nullopt: the path ends here.
+  std::optional<SampleCounts> countsAt(Path& path, const std::optional<VertexEstimate>& estimate) const {
+    const float expected = estimate ? luminance(path.throughput) * estimate->reflectedRadiance : 0.0f;
+    if (!options_.counts || !(expected > 0) || !std::isfinite(expected))
+      return survivesByThroughput(path) ? std::optional(SampleCounts()) : std::nullopt;
+    if (path.reference <= 0) path.reference = options_.counts->reference(expected);
+    if (path.depth == 1) return SampleCounts();
+    SampleCounts counts = options_.counts->counts(estimate->record, expected / path.reference);
+    counts.continued = std::min(counts.continued, std::max(1.0f, kMaxBranches / path.branches));
     // Below 1 in long paths, so that every path ends.
-    const float most = path.depth >= options_.rouletteDepth ? kMaxSurvival : 1.0f;
-    if (!(ratio >= kWeightWindowLow))
-      return survives(path, std::clamp(ratio / kWeightWindowLow, kLeastSurvival, most)) ? 1 : 0;
-    if (!survives(path, most)) return 0;
-    const int room = kMaxBranches / path.branches;
-    return ratio <= kWeightWindowHigh ? 1 : std::max(1, std::min(static_cast<int>(std::min(ratio, 1e3f)), room));
+    if (path.depth >= options_.rouletteDepth && counts.continued <= 1)
+      counts.continued = std::min(counts.continued, kMaxSurvival);
+    return counts;
+  }
+
+  // A random integer whose expected value is the count.
+  static int rounded(float count, Sampler& rng) {
+    const float below = std::floor(count);
+    return static_cast<int>(below) + (count > below && rng.uniform() < count - below ? 1 : 0);
   }
 
   bool scatter(Path& path, const SurfaceHit& hit) const {
     const float deltaFraction = hit.bsdf->deltaProbability(hit.wo, hit.uv);
     if (deltaFraction >= 1.0f) return survivesByThroughput(path) && scatterDelta(path, hit, deltaFraction);
     const typename Guide::Vertex vertex(sampler_, hit);
-    const int copies = continuations(path, vertex);
+    const std::optional<VertexEstimate> estimate =
+        options_.counts || path.log ? vertex.estimate() : std::optional<VertexEstimate>();
+    const std::optional<SampleCounts> counts = countsAt(path, estimate);
+    if (!counts) return false;
+    const bool logged = path.log && logVertex(path, estimate);
+    addDirectLight(path, hit, vertex, 1.0f - deltaFraction, counts->direct);
+    if (logged) logDirect(path);
+    return goOn(path, hit, vertex, deltaFraction, counts->continued);
+  }
+
+  bool logVertex(Path& path, const std::optional<VertexEstimate>& estimate) const {
+    const float throughput = luminance(path.throughput);
+    if (!estimate || !(throughput * estimate->reflectedRadiance > 0)) return false;
+    path.log->vertices.push_back(
+        {*estimate, throughput, luminance(path.radiance), 0, static_cast<float>(path.statistics->cost()), 0});
+    return true;
+  }
+
+  void logDirect(Path& path) const {
+    PathLog::Vertex& vertex = path.log->vertices.back();
+    vertex.radianceDirect = luminance(path.radiance);
+    vertex.costDirect = static_cast<float>(path.statistics->cost());
+  }
+
+  // Continues the path in `count` directions on average. The last is followed by the caller: returns whether there is
+  // one.
+  bool goOn(Path& path, const SurfaceHit& hit, const typename Guide::Vertex& vertex, float deltaFraction,
+            float count) const {
+    const int copies = rounded(count, *path.rng);
     if (copies == 0) return false;
-    path.throughput /= static_cast<float>(copies);
-    path.branches *= copies;
+    path.throughput /= count;
+    path.branches *= std::max(1.0f, count);
     for (int i = 1; i < copies; ++i) {
+      Sampler rng = path.rng->branch();
       Path branch = path;
+      branch.rng = &rng;
       branch.radiance = Rgb::Zero();
       if (scatterAt(branch, hit, vertex, deltaFraction)) follow(branch);
       path.radiance += branch.radiance;
@@ -169,29 +204,47 @@ class PathLoop {
   }
 
   bool scatterAt(Path& path, const SurfaceHit& hit, const typename Guide::Vertex& vertex, float deltaFraction) const {
-    addDirectLight(path, hit, vertex, 1.0f - deltaFraction);
-    if (deltaFraction <= 0.0f || path.rng.uniform() >= deltaFraction)
+    if (deltaFraction <= 0.0f || path.rng->uniform() >= deltaFraction)
       return scatterSmooth(path, hit, vertex, 1.0f - deltaFraction);
     return scatterDelta(path, hit, deltaFraction);
   }
 
-  void addDirectLight(Path& path, const SurfaceHit& hit, const typename Guide::Vertex& vertex, float fraction) const {
-    const float choice = path.rng.stratified();
-    const std::optional<LightSample> light = scene_.lights.sample(hit.position, choice, path.rng.stratified2());
-    if (!light) return;
+  // Next-event estimation with `count` samples on average. fraction: the probability of sampling the non-delta
+  // component.
+  void addDirectLight(Path& path, const SurfaceHit& hit, const typename Guide::Vertex& vertex, float fraction,
+                      float count) const {
+    constexpr int kNumbersOfDirectLight = 3;
+    const int samples = rounded(count, *path.rng);
+    if (samples == 0) path.rng->skip(kNumbersOfDirectLight);
+    Rgb sum = Rgb::Zero();
+    if (samples > 0) sum += directLight(path, hit, vertex, fraction, *path.rng);
+    for (int i = 1; i < samples; ++i) {
+      Sampler rng = path.rng->branch();
+      sum += directLight(path, hit, vertex, fraction, rng);
+    }
+    path.radiance += path.throughput * sum / count;
+  }
+
+  // One sample of next-event estimation: the light that is scattered at the vertex, without the path's throughput.
+  Rgb directLight(const Path& path, const SurfaceHit& hit, const typename Guide::Vertex& vertex, float fraction,
+                  Sampler& rng) const {
+    const Rgb none = Rgb::Zero();
+    const float choice = rng.stratified();
+    const std::optional<LightSample> light = scene_.lights.sample(hit.position, choice, rng.stratified2());
+    if (!light) return none;
     const Vec3 wi = hit.frame.toLocal(light->wi);
-    if (!sidesAgree(hit, light->wi, wi)) return;
+    if (!sidesAgree(hit, light->wi, wi)) return none;
     const Rgb f = evalBsdf(hit, wi);
-    if (!(f.maxCoeff() > 0.0f)) return;
+    if (!(f.maxCoeff() > 0.0f)) return none;
     const ArrivingLight arriving = scene_.arriving(hit, *light, options_.maxDepth - path.depth - 1);
-    path.statistics.shadowRays += static_cast<std::uint64_t>(arriving.rays);
-    if (!(arriving.radiance.maxCoeff() > 0.0f)) return;
+    path.statistics->shadowRays += static_cast<std::uint64_t>(arriving.rays);
+    if (!(arriving.radiance.maxCoeff() > 0.0f)) return none;
     const float weight = light->delta ? 1.0f : misWeight(light->pdf, fraction * vertex.pdf(wi));
-    path.radiance += path.throughput * f * arriving.radiance * (std::abs(wi.z()) * weight / light->pdf);
+    return f * arriving.radiance * (std::abs(wi.z()) * weight / light->pdf);
   }
 
   bool scatterSmooth(Path& path, const SurfaceHit& hit, const typename Guide::Vertex& vertex, float fraction) const {
-    const std::optional<BsdfSample> sample = vertex.sample(path.rng, path.statistics);
+    const std::optional<BsdfSample> sample = vertex.sample(*path.rng, *path.statistics);
     if (!sample) return false;
     const float pdf = fraction * sample->pdf;
     path.eta2 *= sample->eta * sample->eta;
@@ -201,8 +254,8 @@ class PathLoop {
   }
 
   bool scatterDelta(Path& path, const SurfaceHit& hit, float fraction) const {
-    path.statistics.countDelta();
-    const std::optional<DeltaSample> sample = sampleDelta(hit, path.rng.uniform());
+    path.statistics->countDelta();
+    const std::optional<DeltaSample> sample = sampleDelta(hit, path.rng->uniform());
     if (!sample) return false;
     path.emissionWeight.passed(hit, sample->wi, scene_.shadowSurfaces);
     path.eta2 *= sample->eta * sample->eta;
