@@ -42,7 +42,8 @@ class Studio {
     illumination_ = trainIllumination(*renderScene_, *camera_, &*caches_, plan).field;
     guided_.emplace(scene_, illumination_, nullptr);
     product_.emplace(scene_, illumination_, &*caches_);
-    counts_ = learnSampleCounts(*renderScene_, *camera_, {}, *product_, illumination_.records(), 5000, 6);
+    guidedCounts_ = countsFor(*guided_);
+    productCounts_ = countsFor(*product_);
   }
 
   Film render(const Integrator& integrator, int samples, std::uint64_t seed) const {
@@ -52,13 +53,9 @@ class Studio {
   }
 
   PathIntegrator path() const { return {*renderScene_, {}}; }
-  GuidedIntegrator guided() const { return {*renderScene_, {}, *guided_}; }
-  GuidedIntegrator product() const { return {*renderScene_, {}, *product_}; }
-  GuidedIntegrator productWithCounts() const {
-    PathOptions options;
-    options.counts = &*counts_;
-    return {*renderScene_, options, *product_};
-  }
+  GuidedIntegrator guided() const { return {*renderScene_, with(*guidedCounts_), *guided_}; }
+  GuidedIntegrator product() const { return {*renderScene_, with(*productCounts_), *product_}; }
+  GuidedIntegrator productWithThroughputRoulette() const { return {*renderScene_, {}, *product_}; }
   const RenderScene& renderScene() const { return *renderScene_; }
   const Scene& scene() const { return scene_; }
   const GuidedSampler& productSampler() const { return *product_; }
@@ -66,6 +63,15 @@ class Studio {
   std::filesystem::path lobes() const { return folder_ / "lobes"; }
 
  private:
+  SampleCountModel countsFor(const GuidedSampler& guide) const {
+    return learnSampleCounts(*renderScene_, *camera_, {}, guide, illumination_.records(), 5000, 6);
+  }
+  static PathOptions with(const SampleCountModel& counts) {
+    PathOptions options;
+    options.counts = &counts;
+    return options;
+  }
+
   Folder folder_;
   Scene scene_;
   std::optional<RenderScene> renderScene_;
@@ -73,7 +79,7 @@ class Studio {
   std::optional<LobeCacheSet> caches_;
   Field illumination_;
   std::optional<GuidedSampler> guided_, product_;
-  std::optional<SampleCountModel> counts_;
+  std::optional<SampleCountModel> guidedCounts_, productCounts_;
 };
 
 }  // namespace lobe::test

@@ -64,7 +64,7 @@ void checkAgreement(const Studio& studio) {
   const auto path = blocks(studio.render(studio.path(), 1024, 1), 5);
   CHECK(agree(path, blocks(studio.render(studio.guided(), 512, 2), 5)));
   CHECK(agree(path, blocks(studio.render(studio.product(), 512, 3), 5)));
-  CHECK(agree(path, blocks(studio.render(studio.productWithCounts(), 512, 5), 5)));
+  CHECK(agree(path, blocks(studio.render(studio.productWithThroughputRoulette(), 512, 5), 5)));
   CHECK_FALSE(agree(path, blocks(studio.render(WrongIntegrator(studio), 512, 4), 5)));
 }
 
@@ -77,7 +77,7 @@ TEST_CASE("unbiased: all integrators agree on the demo scene", "[slow]") {
   const auto path = blocks(studio.render(studio.path(), 2 * samples, 1), size);
   CHECK(agree(path, blocks(studio.render(studio.guided(), samples, 2), size)));
   CHECK(agree(path, blocks(studio.render(studio.product(), samples, 3), size)));
-  CHECK(agree(path, blocks(studio.render(studio.productWithCounts(), samples, 5), size)));
+  CHECK(agree(path, blocks(studio.render(studio.productWithThroughputRoulette(), samples, 5), size)));
   CHECK_FALSE(agree(path, blocks(studio.render(WrongIntegrator(studio), samples, 4), size)));
 }
 
@@ -91,7 +91,7 @@ TEST_CASE("unbiased: radiance in an emissive box is emission over absorption", "
   const Studio studio(readScene(folder / "furnace.xml"), 30, 20);
   for (const auto& film :
        {studio.render(studio.path(), 256, 6), studio.render(studio.guided(), 256, 7),
-        studio.render(studio.productWithCounts(), 256, 9), studio.render(studio.product(), 256, 8)}) {
+        studio.render(studio.productWithThroughputRoulette(), 256, 9), studio.render(studio.product(), 256, 8)}) {
     const auto found = blocks(film, 5);
     CHECK(agree(found, exactly(2.0, found.size())));
   }
