@@ -27,7 +27,7 @@ std::pair<int, int> parsePair(const std::string& option, const std::string& text
 
 constexpr std::uint64_t kMaxSeed = std::uint64_t{1} << 53;  // the metadata of a picture stores it exactly
 
-const std::vector<std::string> kIntegratorNames{"path", "guided", "product"};  // in the order of IntegratorKind
+const std::vector<std::string> kIntegratorNames{"auto", "path", "guided", "product"};  // in the order of IntegratorKind
 const std::vector<std::string> kFractionsNames{"fixed", "learnt"};
 
 // The old names are accepted in version 0.2 only.
@@ -38,7 +38,7 @@ const std::vector<RenamedOption> kRenamedOptions{
 
 struct Options {
   RenderJob job;
-  std::string size, record, integrator = "product", fractions = "learnt";
+  std::string size, record, integrator = "auto", fractions = "learnt";
   int threads = 0;
   bool check = false, json = false;
   std::vector<const CLI::Option*> guidedOnly;  ///< rendering options that path tracing ignores
@@ -96,9 +96,10 @@ void declare(CLI::App& app, Options& options) {
   app.add_option("--cache", job.cacheFolder, "Folder of the BRDF caches made by lobefit")
       ->type_name("DIR")
       ->capture_default_str();
-  app.add_option(
-         "--integrator", options.integrator,
-         "Integrator: path (BSDF sampling), guided (illumination and BSDF) or product (BRDF times illumination)")
+  app.add_option("--integrator", options.integrator,
+                 "Integrator: path (BSDF sampling), guided (illumination and BSDF), product (BRDF times illumination), "
+                 "or auto: path "
+                 "or product, whichever has the lower error in a short comparison after training")
       ->check(CLI::IsMember(kIntegratorNames))
       ->capture_default_str();
   app.add_option("--spp", job.samples, "Number of samples per pixel");
@@ -164,8 +165,8 @@ void declare(CLI::App& app, Options& options) {
 void noteUnused(const Options& options) {
   std::vector<std::string> unused;
   for (const CLI::Option* option : options.training) {
-    const bool used =
-        options.integrator == "product" || (options.integrator == "guided" && option->get_name() != "--bsdf-fraction");
+    const bool used = options.integrator == "product" || options.integrator == "auto" ||
+                      (options.integrator == "guided" && option->get_name() != "--bsdf-fraction");
     if (option->count() > 0 && !used) unused.push_back(option->get_name());
   }
   if (options.integrator == "path")

@@ -25,6 +25,7 @@
 #include "runtime/image/image_output.h"
 #include "runtime/render/integrators/learn_sample_counts.h"
 #include "runtime/render/integrators/path_integrator.h"
+#include "runtime/render/integrators/pilot.h"
 #include "runtime/render/integrators/renderer.h"
 #include "runtime/tools/stored_illumination.h"
 #include "runtime/tools/tool.h"
@@ -42,7 +43,7 @@ constexpr double kTrainingFraction = 0.15;
 constexpr std::int64_t kMaxPixels = 1 << 28;  // larger sizes are assumed to be typing errors
 
 const char* nameOf(IntegratorKind kind) {
-  constexpr std::array names{"path", "guided", "product"};
+  constexpr std::array names{"auto", "path", "guided", "product"};
   return names[static_cast<std::size_t>(kind)];
 }
 
@@ -133,6 +134,16 @@ class ConvergenceLog {
   std::string text_;
 };
 
+/// The comparison of path and product for IntegratorKind::automatic.
+struct Pilot {
+  PilotResult path, product;
+  double seconds;
+
+  IntegratorKind best() const {
+    return path.inefficiency() < product.inefficiency() ? IntegratorKind::path : IntegratorKind::product;
+  }
+};
+
 /// BRDF caches and trained illumination; both are empty for `path`. Cannot be moved, because the sampler refers to the
 /// other members.
 struct Guiding {
@@ -145,8 +156,10 @@ struct Guiding {
   std::optional<GuidedSampler> sampler;
   std::optional<SampleCountModel> counts;
   double secondsCounts = 0;  ///< time for learning the counts
+  std::optional<Pilot> pilot;
 
-  double seconds() const { return training.report.seconds + secondsCounts; }
+  /// Time spent before rendering.
+  double seconds() const { return training.report.seconds + secondsCounts + (pilot ? pilot->seconds : 0); }
   const LobeCacheSet* cachesOrNull() const { return caches ? &*caches : nullptr; }
   std::size_t unreducedBytes = 0;  ///< size of the records before merging
 
@@ -163,6 +176,9 @@ struct RunResult {
   std::uint64_t dropped;
 
   const TrainingReport& training() const { return guiding.training.report; }
+  IntegratorKind integrator(const RenderJob& job) const {
+    return guiding.pilot ? guiding.pilot->best() : job.integrator;
+  }
   double seconds() const { return guiding.seconds() + render.total.seconds; }
 };
 
@@ -192,12 +208,21 @@ nlohmann::ordered_json fractionsOf(const std::array<std::uint64_t, size>& counts
   return fractions;
 }
 
+nlohmann::ordered_json asJson(const std::optional<Pilot>& pilot) {
+  if (!pilot) return nullptr;
+  const auto one = [](const PilotResult& result) {
+    return nlohmann::ordered_json{{"variance", result.variance}, {"cost", result.cost}};
+  };
+  return {{"seconds", pilot->seconds}, {"path", one(pilot->path)}, {"product", one(pilot->product)}};
+}
+
 nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, const RunResult& run) {
   const PathStatistics& paths = run.render.statistics;
   const RenderProgress& total = run.render.total;
   nlohmann::ordered_json passes = nlohmann::ordered_json::array();
   for (const PassReport& pass : run.training().passes) passes.push_back(asJson(pass));
-  return {{"integrator", nameOf(job.integrator)},
+  return {{"integrator", nameOf(run.integrator(job))},
+          {"pilot", asJson(run.guiding.pilot)},
           {"seed", job.seed},
           {"seconds_reading", load.reading},
           {"seconds_building", load.building},
@@ -229,7 +254,7 @@ nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, c
 
 ImageAttributes attributes(const RenderJob& job, std::uint64_t sceneHash, const RunResult& run) {
   ImageAttributes all{{"software", fmt::format("Lobe {}", LOBE_VERSION)},
-                      {"integrator", std::string(nameOf(job.integrator))},
+                      {"integrator", std::string(nameOf(run.integrator(job)))},
                       {"seed", static_cast<double>(job.seed)},
                       {"samples", static_cast<double>(run.render.total.samples)},
                       {"sampleOffset", static_cast<double>(job.sampleOffset)},
@@ -286,7 +311,7 @@ void drawRecord(const RenderJob& job, const RenderScene& scene, const Receiver& 
 
 /// Learning the counts of samples takes a few percent of the time for rendering.
 int pathsForSampleCounts(const RenderJob& job, const RayCamera& camera) {
-  constexpr double kFraction = 0.05, kPathsPerSecond = 3000, kFewest = 20000, kMost = 150000;
+  constexpr double kFraction = 0.05, kPathsPerSecond = 7000, kFewest = 30000, kMost = 200000;
   const double wanted =
       job.seconds ? kPathsPerSecond * *job.seconds : kFraction * *job.samples * camera.width() * camera.height();
   return static_cast<int>(std::clamp(wanted, kFewest, kMost));
@@ -300,17 +325,35 @@ void learnCounts(const RenderJob& job, const RenderScene& scene, const RayCamera
   guiding.secondsCounts = watch.seconds();
 }
 
+PathOptions pathOptions(const RenderJob& job, const Scene& scene) {
+  PathOptions options;
+  if (const std::optional<int> depth = job.maxDepth ? job.maxDepth : scene.maxDepth) options.maxDepth = *depth;
+  options.emitterVisibility = scene.emitterVisibility;
+  return options;
+}
+
 std::unique_ptr<Integrator> makeIntegrator(const RenderJob& job, const RenderScene& scene, const RayCamera& camera,
                                            Guiding& guiding) {
-  PathOptions options;
-  if (const std::optional<int> depth = job.maxDepth ? job.maxDepth : scene.scene.maxDepth) options.maxDepth = *depth;
-  options.emitterVisibility = scene.scene.emitterVisibility;
-  if (!guiding.sampler) return std::make_unique<PathIntegrator>(scene, options);
+  PathOptions options = pathOptions(job, scene.scene);
+  auto path = std::make_unique<PathIntegrator>(scene, options);
+  if (!guiding.sampler) return path;
   if (job.russianRoulette == RussianRoulette::efficiency) {
     learnCounts(job, scene, camera, options, guiding);
     options.counts = &*guiding.counts;
   }
-  return std::make_unique<GuidedIntegrator>(scene, options, *guiding.sampler);
+  auto guided = std::make_unique<GuidedIntegrator>(scene, options, *guiding.sampler);
+  if (job.integrator != IntegratorKind::automatic) return guided;
+  const Stopwatch watch;
+  const auto results =
+      comparePilots(camera, std::array<const Integrator*, 2>{path.get(), guided.get()}, {.seed = job.seed});
+  guiding.pilot = {results[0], results[1], watch.seconds()};
+  if (guiding.pilot->best() == IntegratorKind::path) return path;
+  return guided;
+}
+
+/// Whether the integrator may sample the product.
+bool mayUseProduct(IntegratorKind kind) {
+  return kind == IntegratorKind::product || kind == IntegratorKind::automatic;
 }
 
 RenderOptions renderOptions(const RenderJob& job, double trained) {
@@ -346,7 +389,7 @@ void RenderJob::validate() const {
   require(!samples || *samples <= std::numeric_limits<int>::max() - sampleOffset,
           fmt::format("the sum of --sample-offset and --spp must be at most {}", std::numeric_limits<int>::max()));
   require(integrator != IntegratorKind::path || (illumination.empty() && saveIllumination.empty()),
-          "--illumination and --save-illumination require --integrator guided or product");
+          "--illumination and --save-illumination require --integrator auto, guided or product");
   require(illumination.empty() || saveIllumination.empty(),
           "--save-illumination cannot be combined with --illumination, which replaces training");
   require(!seconds || (*seconds > 0 && std::isfinite(*seconds)), "--seconds must be a finite number greater than 0");
@@ -360,7 +403,7 @@ void RenderJob::validate() const {
   require(reference.empty() == convergence.empty(), "--reference and --convergence require each other");
   require(reduction >= 0 && std::isfinite(reduction), "--reduction must be a finite number of at least 0");
   require(!outputs.empty(), "-o FILE is required");
-  require(!record || integrator != IntegratorKind::path, "--record requires --integrator guided or product");
+  require(!record || integrator != IntegratorKind::path, "--record requires --integrator auto, guided or product");
   require(recordImage.extension() == ".png", "--record-image must name a .png file");
   try {
     training.validate();
@@ -392,13 +435,13 @@ void run(const RenderJob& job) {
   if (stored) {
     const Stopwatch restoring;
     guiding.training = restoreIllumination(*stored, job.illumination, scene);
-    if (job.integrator == IntegratorKind::product && !guiding.training.report.learntFractions)
+    if (mayUseProduct(job.integrator) && !guiding.training.report.learntFractions)
       printNote(kTool, fmt::format("{}: the records have learnt no BSDF sampling fractions (trained by guided, or with "
                                    "--bsdf-fraction fixed); all use {:.1f}",
                                    job.illumination.string(), kInitialBsdfFraction));
     load.restoring = restoring.seconds();
   }
-  if (job.integrator == IntegratorKind::product)
+  if (mayUseProduct(job.integrator))
     guiding.caches.emplace(job.cacheFolder, lobeRequests(scene), lobefitCommand(job), job.reduction);
   const Stopwatch building;
   const RenderScene renderScene(scene, job.shadowSurfaces);

@@ -15,7 +15,8 @@
 
 namespace lobe {
 
-enum class IntegratorKind { path, guided, product };
+/// automatic: path or product, whichever reaches the lower error in a pilot (pilot.h).
+enum class IntegratorKind { automatic, path, guided, product };
 
 /// Russian roulette by the path's throughput, or efficiency-aware Russian roulette and splitting (sample_counts.h).
 enum class RussianRoulette { throughput, efficiency };
@@ -27,7 +28,7 @@ struct RenderJob {
   std::filesystem::path cacheFolder = "lobes";
   std::vector<std::filesystem::path> outputs;
 
-  IntegratorKind integrator = IntegratorKind::product;
+  IntegratorKind integrator = IntegratorKind::automatic;
   std::optional<int> samples;     ///< per pixel; exactly one of samples and seconds is set
   int sampleOffset = 0;           ///< index of the first sample of every pixel
   std::optional<double> seconds;  ///< for training and rendering together

@@ -108,8 +108,8 @@ TEST_CASE("loberender: options that conflict with an illumination file are error
       {" --components 9", "--components"},
       {" --photons 0", "--photons"},
       {" --illumination a.illum --save-illumination b.illum", "--save-illumination"},
-      {" --illumination a.illum --integrator path", "require --integrator guided or product"},
-      {" --save-illumination a.illum --integrator path", "require --integrator guided or product"},
+      {" --illumination a.illum --integrator path", "require --integrator auto, guided or product"},
+      {" --save-illumination a.illum --integrator path", "require --integrator auto, guided or product"},
       {" --save-illumination a.exr", "a.exr"},
       {" --sample-offset -1", "--sample-offset"},
       {" --sample-offset 2147483647", "at most 2147483647"}};

@@ -150,7 +150,7 @@ TEST_CASE("loberender: invalid command lines are errors") {
                                                                {" --spp 1 --max-depth 0", "--max-depth"},
                                                                {" --spp 1 --seed -1", "--seed"},
                                                                {" --spp 1 --seed 18446744073709551616", "--seed"},
-                                                               {" --spp 1 --integrator 1", "path,guided,product"},
+                                                               {" --spp 1 --integrator 1", "auto,path,guided,product"},
                                                                {" --spp 1 --reference a.exr", "--convergence"},
                                                                {" --spp 1 --convergence a.csv", "--reference"},
                                                                {" --spp 1 --integrator magic", "--integrator"},
@@ -236,10 +236,13 @@ TEST_CASE("loberender: statistics and convergence and images of a run") {
   SECTION("statistics") {
     const auto s = nlohmann::json::parse(folder.bytes("s.json"));
     const double training = s.at("seconds_training"), rendering = s.at("seconds_rendering");
-    CHECK(s.at("integrator") == "product");
+    const double path = s.at("pilot").at("path").at("variance"), product = s.at("pilot").at("product").at("variance");
+    const double pathCost = s.at("pilot").at("path").at("cost"), productCost = s.at("pilot").at("product").at("cost");
+    CHECK(s.at("integrator") == (path * pathCost < product * productCost ? "path" : "product"));
     CHECK(training > 0);
     CHECK(rendering > 0);
-    CHECK(s.at("seconds_total").get<double>() == Approx(training + rendering));
+    const double preparing = s.at("seconds_sample_counts").get<double>() + s.at("pilot").at("seconds").get<double>();
+    CHECK(s.at("seconds_total").get<double>() == Approx(training + preparing + rendering));
     CHECK(s.at("spp") >= 1);
     CHECK(s.at("rays") >= s.at("path_segments"));
     CHECK(s.at("path_segments") >= s.at("spp").get<int>() * 16 * 12);
@@ -319,7 +322,7 @@ TEST_CASE("loberender: --record reports why no record can be plotted") {
              Catch::Contains("must name a .png file"));
   CHECK_THAT(fault(folder, guided + " --record-image a.png", 2), Catch::Contains("--record"));
   CHECK_THAT(fault(folder, "loberender scene.xml -o a.exr --spp 1 --integrator path --record 8,11", 2),
-             Catch::Contains("requires --integrator guided or product"));
+             Catch::Contains("requires --integrator auto, guided or product"));
   // Without light there are no records.
   std::string dark = kScene;
   const std::string radiance = "radiance\" value=\"";

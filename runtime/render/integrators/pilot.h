@@ -1,0 +1,33 @@
+#pragma once
+// Compares integrators on some of the pixels, to choose the one that reaches the lower error in equal time.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/render/film/camera.h"
+#include "runtime/render/integrators/integrator.h"
+
+namespace lobe {
+
+struct PilotOptions {
+  int tiles = 128;  ///< of 4×4 pixels, at most; spread over the image
+  int samples = 8;  ///< per pixel, for each of the two independent pictures that are compared
+  std::uint64_t seed = 1;
+};
+
+struct PilotResult {
+  /// Relative variance of a pixel, luminance: half the squared difference of the two pictures over m² + (median / 2)²,
+  /// without the worst 0.5 % of the pixels. m is the mean of the pixel's tile over all integrators, because that of the
+  /// pixel would be too noisy, and the median is that of the tiles.
+  double variance = 0;
+  double cost = 0;  ///< of a sample, PathStatistics::cost
+  /// The relative variance of a picture times the time it takes.
+  double inefficiency() const { return variance * cost; }
+};
+
+/// The results in the order of the integrators. They do not depend on the number of threads.
+std::vector<PilotResult> comparePilots(const RayCamera& camera, std::span<const Integrator* const> integrators,
+                                       const PilotOptions& options);
+
+}  // namespace lobe

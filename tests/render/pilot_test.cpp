@@ -1,0 +1,59 @@
+// The comparison of integrators by which loberender chooses one.
+
+#include <array>
+
+#include <catch2/catch.hpp>
+
+#include "runtime/render/integrators/pilot.h"
+#include "scenes/camera.h"
+
+namespace {
+
+using namespace lobe;
+
+/// Radiance 1 with noise: uniform in [1 − noise, 1 + noise], by independent numbers; `segments` per path.
+class Noisy : public Integrator {
+ public:
+  Noisy(float noise, int segments) : noise_(noise), segments_(segments) {}
+  Rgb radiance(const Ray&, Sampler& rng, PathStatistics& statistics) const override {
+    statistics.segments += static_cast<std::uint64_t>(segments_);
+    return Rgb::Constant(1 + noise_ * (2 * rng.uniform() - 1));
+  }
+
+ private:
+  float noise_;
+  int segments_;
+};
+
+RayCamera cameraOf(int width, int height) {
+  Camera camera;
+  camera.width = width, camera.height = height;
+  return {camera, {}};
+}
+
+}  // namespace
+
+TEST_CASE("pilot: variance and cost of integrators are those of their samples") {
+  const Noisy little(0.3f, 4), much(0.9f, 1);
+  const std::array<const Integrator*, 2> both{&little, &much};
+  const auto results = comparePilots(cameraOf(160, 90), both, {.samples = 8, .seed = 3});
+  REQUIRE(results.size() == 2);
+  // A mean of 8 uniform numbers has variance noise² / 24; the squared mean is 1 + ¼. The worst pixels are left out.
+  CHECK(results[0].variance == Approx(0.09 / 24 / 1.25).epsilon(0.1));
+  CHECK(results[1].variance == Approx(0.81 / 24 / 1.25).epsilon(0.1));
+  CHECK(results[0].cost == Approx(4));
+  CHECK(results[1].cost == Approx(1));
+  CHECK(results[0].inefficiency() < results[1].inefficiency());
+}
+
+TEST_CASE("pilot: works for images smaller than a tile, and for black ones") {
+  const Noisy noisy(0.5f, 1);
+  const std::array<const Integrator*, 1> one{&noisy};
+  CHECK(comparePilots(cameraOf(1, 3), one, {})[0].variance > 0);
+  class Black : public Integrator {
+    Rgb radiance(const Ray&, Sampler&, PathStatistics&) const override { return Rgb::Zero(); }
+  };
+  const Black black;
+  const std::array<const Integrator*, 1> dark{&black};
+  CHECK(comparePilots(cameraOf(8, 8), dark, {})[0].variance == 0);
+}
