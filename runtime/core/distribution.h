@@ -2,7 +2,9 @@
 // A discrete distribution, sampled by inversion of its cumulative distribution.
 
 #include <algorithm>
+#include <concepts>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -32,9 +34,11 @@ class DiscreteDistribution {
   double weight(std::size_t i) const { return cumulative_[i] - (i > 0 ? cumulative_[i - 1] : 0.0); }
   float probability(std::size_t i) const { return static_cast<float>(weight(i) / total_); }
 
-  /// Samples an index with u uniform in [0,1), and rescales u to be uniform in [0,1) again. Requires total() > 0. Takes
+  /// Samples an index with u uniform in [0,1), and rescales u to be uniform in [0,1) again. A number keeps as many
+  /// random bits as the index leaves, so use double if u serves for more than one choice. Requires total() > 0. Takes
   /// constant time on average.
-  std::size_t sample(float& u) const {
+  template <std::floating_point Real>
+  std::size_t sample(Real& u) const {
     const double target = u * total_;
     std::size_t i = guide_[std::min(static_cast<std::size_t>(u * static_cast<double>(size())), size() - 1)];
     while (i + 1 < size() && cumulative_[i] <= target) ++i;
@@ -43,7 +47,8 @@ class DiscreteDistribution {
 
   /// Samples an index in [first, last) in the same way; probabilities are relative to mass(first, last), which must be
   /// positive. Takes logarithmic time.
-  std::size_t sample(float& u, std::size_t first, std::size_t last) const {
+  template <std::floating_point Real>
+  std::size_t sample(Real& u, std::size_t first, std::size_t last) const {
     if (first == 0 && last == size()) return sample(u);
     const double low = first > 0 ? cumulative_[first - 1] : 0.0;
     const double target = low + u * (cumulative_[last - 1] - low);
@@ -60,11 +65,14 @@ class DiscreteDistribution {
  private:
   // Rescales u to the position of the target within the weight of index i. If rounding has placed the target at the end
   // of the range, the last index with positive weight is used.
-  std::size_t finish(std::size_t i, std::size_t last, double target, float& u) const {
+  template <std::floating_point Real>
+  std::size_t finish(std::size_t i, std::size_t last, double target, Real& u) const {
     i = std::min(i, last - 1);
     while (i > 0 && !(cumulative_[i] > cumulative_[i - 1])) --i;
     const double below = i > 0 ? cumulative_[i - 1] : 0.0;
-    u = std::clamp(static_cast<float>((target - below) / (cumulative_[i] - below)), 0.0f, kOneMinusEpsilon);
+    constexpr Real one = 1;
+    constexpr Real most = one - std::numeric_limits<Real>::epsilon() / 2;  // the largest number below 1
+    u = std::clamp(static_cast<Real>((target - below) / (cumulative_[i] - below)), Real{0}, most);
     return i;
   }
 

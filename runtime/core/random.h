@@ -27,6 +27,11 @@ class Rng {
 
   /// Uniform in [0, 1), 24 bits.
   float uniform() { return static_cast<float>(next() >> 8) * 0x1p-24f; }
+  /// Uniform in [0, 1), 53 bits: enough to choose one of many lights and then one of many triangles with one number.
+  double uniformDouble() {
+    const std::uint64_t high = next();
+    return static_cast<double>((high << 32 | next()) >> 11) * 0x1p-53;
+  }
   Eigen::Vector2f uniform2() {
     const float x = uniform();
     return {x, uniform()};

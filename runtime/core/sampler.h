@@ -46,15 +46,19 @@ class Sampler {
 
   /// Independent of all other numbers. For decisions such as Russian roulette.
   float uniform() { return rng_.uniform(); }
+  double uniformDouble() { return rng_.uniformDouble(); }
   Eigen::Vector2f uniform2() { return rng_.uniform2(); }
 
   /// For the position on the film and the lens, and for the choice of lights and directions at the first vertices.
   float stratified() {
     if (dimension_ >= kSobolDimensions) return rng_.uniform();
-    const std::uint32_t seed = scramble_ ^ (0x9e3779b9u * static_cast<std::uint32_t>(dimension_ + 1));
-    const std::uint32_t x = owenScramble(sobol(index_, dimension_), mixed(seed));
-    ++dimension_;
-    return static_cast<float>(x >> 8) * 0x1p-24f;
+    return static_cast<float>(nextCoordinate() >> 8) * 0x1p-24f;
+  }
+  /// One dimension with 53 bits; those that the sequence does not have are independent.
+  double stratifiedDouble() {
+    if (dimension_ >= kSobolDimensions) return rng_.uniformDouble();
+    const std::uint64_t high = nextCoordinate();
+    return static_cast<double>((high << 32 | rng_.next()) >> 11) * 0x1p-53;
   }
   Eigen::Vector2f stratified2() {
     const float x = stratified();
@@ -62,6 +66,12 @@ class Sampler {
   }
 
  private:
+  // The next coordinate of the scrambled point, as a fraction of 2³².
+  std::uint32_t nextCoordinate() {
+    const std::uint32_t seed = scramble_ ^ (0x9e3779b9u * static_cast<std::uint32_t>(dimension_ + 1));
+    return owenScramble(sobol(index_, dimension_++), mixed(seed));
+  }
+
   // A 32-bit finaliser (MurmurHash3).
   static std::uint32_t mixed(std::uint32_t x) {
     x = (x ^ (x >> 16)) * 0x85ebca6bu;

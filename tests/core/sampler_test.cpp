@@ -28,6 +28,18 @@ TEST_CASE("core: every dimension of a scrambled Sobol sequence is stratified") {
   }
 }
 
+TEST_CASE("core: stratified numbers of double precision are those of the sequence with more digits") {
+  int equal = 0;
+  for (std::uint32_t i = 0; i < 64; ++i) {
+    const double fine = Sampler::stratified(3, 1, i).stratifiedDouble();
+    const float coarse = Sampler::stratified(3, 1, i).stratified();
+    CHECK(fine >= coarse);
+    CHECK(fine < coarse + 0x1p-24);
+    equal += fine == coarse;
+  }
+  CHECK(equal == 0);
+}
+
 TEST_CASE("core: the first two dimensions fill every elementary interval") {
   // A (0, m, 2)-net in base 2: each of 2^m boxes of any shape with area 2^-m holds one of 2^m points.
   constexpr int kBits = 8;

@@ -104,7 +104,7 @@ TEST_CASE("render: light does not leak through a floor from just below it") {
   const SurfaceHit floor = hitOf(scene, {Vec3(0.3f, 1, 0.2f), Vec3(0, -1, 0)});
   Sampler rng(1);
   for (int i = 0; i < 1000; ++i) {
-    const float choice = rng.uniform();
+    const double choice = rng.uniformDouble();
     const auto light = ready.lights.sample(Vec3(0.3f, 0.5f, 0.2f), choice, rng.uniform2());
     REQUIRE(light);
     SurfacePoint above = floor;

@@ -74,7 +74,7 @@ TEST_CASE("render: the density of a light sample agrees with the density of its 
     Rng rng(4);
     int differing = 0;
     for (int i = 0; i < 5000; ++i) {
-      const float choice = rng.uniform();
+      const double choice = rng.uniformDouble();
       const auto light = ready.lights.sample(c.point, choice, rng.uniform2());
       if (!light || (!light->source && ready.tracer.occluded({c.point, light->wi}))) continue;
       const float pdf = pdfByTracing(ready, c.point, light->wi);
@@ -90,7 +90,7 @@ TEST_CASE("render: light samples follow their density") {
     const RenderScene ready(c.scene);
     Rng rng(11);
     const auto draw = [&]() -> std::optional<Vec3> {
-      const float choice = rng.uniform();
+      const double choice = rng.uniformDouble();
       const auto light = ready.lights.sample(c.point, choice, rng.uniform2());
       if (!light || (!light->source && ready.tracer.occluded({c.point, light->wi}))) return std::nullopt;
       return light->wi;
@@ -106,12 +106,62 @@ TEST_CASE("render: a wrong density of light sampling is detected") {
   const RenderScene ready(c.scene);
   Rng rng(11);
   const auto draw = [&]() -> std::optional<Vec3> {
-    const float choice = rng.uniform();
+    const double choice = rng.uniformDouble();
     const auto light = ready.lights.sample(c.point, choice, rng.uniform2());
     return light ? std::optional(light->wi) : std::nullopt;
   };
   const auto wrong = [&](const Vec3& w) { return pdfByTracing(ready, c.point, w) * (1.0f + 0.3f * w.x()); };
   CHECK_FALSE(chi2Sphere(draw, wrong).passed());
+}
+
+TEST_CASE("render: every triangle of a light that is rarely chosen is reached") {
+  constexpr int kLights = 1000, kSide = 70;
+  Scene scene;
+  for (int i = 0; i < kLights; ++i) addEmitter(scene, Sphere{{0.1f * static_cast<float>(i), 5, 0}, 0.01f}, 1e6f);
+  TriangleMesh grid;  // of triangles of equal area
+  for (int y = 0; y < kSide; ++y)
+    for (int x = 0; x < kSide; ++x) {
+      const auto first = static_cast<std::uint32_t>(grid.positions.size());
+      const Vec3 corner(static_cast<float>(x), 3, static_cast<float>(y));
+      grid.positions.insert(grid.positions.end(),
+                            {corner, corner + Vec3(1, 0, 0), corner + Vec3(1, 0, 1), corner + Vec3(0, 0, 1)});
+      grid.triangles.push_back({first, first + 1, first + 2});
+      grid.triangles.push_back({first, first + 2, first + 3});
+    }
+  addEmitter(scene, grid, 1e-3f);
+  const RenderScene ready(scene);
+  const auto triangleOf = [&](double choice) -> std::optional<std::size_t> {
+    const auto light = ready.lights.sample({0, 0, 0}, choice, {0.5f, 0.25f});
+    if (!light || light->source->position.y() != 3) return std::nullopt;
+    const Vec3& p = light->source->position;
+    const float x = std::floor(p.x()), y = std::floor(p.z());
+    return 2 * static_cast<std::size_t>(y * kSide + x) + (p.z() - y > p.x() - x ? 1 : 0);
+  };
+  // The numbers that choose the mesh form one interval.
+  double low = 1, high = 0;
+  constexpr int kProbes = 1 << 17;
+  for (int i = 0; i <= kProbes; ++i) {
+    const double choice = std::min(static_cast<double>(i) / kProbes, 1 - 1e-9);
+    if (!triangleOf(choice)) continue;
+    low = std::min(low, choice - 1.0 / kProbes);
+    high = std::max(high, choice + 1.0 / kProbes);
+  }
+  REQUIRE(low < high);
+  std::vector<int> counts(2 * kSide * kSide);
+  constexpr int kPerTriangle = 20;
+  Rng rng(8);
+  int drawn = 0;
+  while (drawn < kPerTriangle * static_cast<int>(counts.size())) {
+    const double choice = low + (std::min(high, 1.0) - low) * rng.uniformDouble();
+    if (const auto triangle = triangleOf(choice)) {
+      ++counts[*triangle];
+      ++drawn;
+    }
+  }
+  double chi2 = 0;
+  for (const int count : counts) chi2 += std::pow(count - kPerTriangle, 2) / kPerTriangle;
+  const auto freedom = static_cast<double>(counts.size() - 1);
+  CHECK((chi2 - freedom) / std::sqrt(2 * freedom) < kMaxDeviation);
 }
 
 TEST_CASE("render: environment sampling is unbiased for the whole image and for blocks of it") {
@@ -181,7 +231,7 @@ TEST_CASE("render: the flux of delta lights agrees with closed forms at any scen
     Rng rng(3);
     Moments photons;
     for (int i = 0; i < 20000; ++i) {
-      const float choice = rng.uniform();
+      const double choice = rng.uniformDouble();
       const Vec2 u1 = rng.uniform2();
       const auto photon = ready.lights.samplePhoton(choice, u1, rng.uniform2());
       photons.add(photon ? luminance(photon->power) : 0);
@@ -273,7 +323,7 @@ void checkPhotons(const Scene& emitters) {
   Rng rng(9);
   Moments photons, gathered;
   for (int i = 0; i < 400000; ++i) {
-    const float choice = rng.uniform();
+    const double choice = rng.uniformDouble();
     const Vec2 u1 = rng.uniform2();
     const auto photon = ready.lights.samplePhoton(choice, u1, rng.uniform2());
     const auto hit = photon ? ready.tracer.trace(photon->ray) : std::nullopt;
@@ -281,7 +331,7 @@ void checkPhotons(const Scene& emitters) {
     photons.add(received ? luminance(photon->power) : 0);
     const Vec2 d = squareToDisk(rng.uniform2());
     const SurfacePoint point = pointOnDisk(receiver, d.x(), d.y());
-    const float lightChoice = rng.uniform();
+    const double lightChoice = rng.uniformDouble();
     const auto light = ready.lights.sample(point.position, lightChoice, rng.uniform2());
     const bool lit = light && light->wi.y() > 0 && ready.visible(point, *light);
     double irradiance = 0;

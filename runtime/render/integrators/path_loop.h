@@ -229,7 +229,7 @@ class PathLoop {
   Rgb directLight(const Path& path, const SurfaceHit& hit, const typename Guide::Vertex& vertex, float fraction,
                   Sampler& rng) const {
     const Rgb none = Rgb::Zero();
-    const float choice = rng.stratified();
+    const double choice = rng.stratifiedDouble();
     const std::optional<LightSample> light = scene_.lights.sample(hit.position, choice, rng.stratified2());
     if (!light) return none;
     const Vec3 wi = hit.frame.toLocal(light->wi);

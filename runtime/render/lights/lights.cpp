@@ -130,7 +130,7 @@ void Lights::choose(const std::vector<double>& powers) {
   choice_ = DiscreteDistribution(weights);
 }
 
-Lights::PointSample Lights::samplePoint(const AreaLight& light, float choice, const Vec2& u) const {
+Lights::PointSample Lights::samplePoint(const AreaLight& light, double choice, const Vec2& u) const {
   const float density = 1.0f / light.area;
   if (const auto* mesh = std::get_if<TriangleMesh>(&light.shape->geometry)) {
     const auto triangle = static_cast<std::uint32_t>(light.triangles.sample(choice));
@@ -145,7 +145,7 @@ Lights::PointSample Lights::samplePoint(const AreaLight& light, float choice, co
   return {pointOnDisk(std::get<Disk>(light.shape->geometry), d.x(), d.y()), density};
 }
 
-std::optional<LightSample> Lights::sampleArea(const AreaLight& light, const Vec3& point, float choice,
+std::optional<LightSample> Lights::sampleArea(const AreaLight& light, const Vec3& point, double choice,
                                               const Vec2& u) const {
   LightSample result;
   const auto* sphere = std::get_if<Sphere>(&light.shape->geometry);
@@ -173,7 +173,7 @@ std::optional<LightSample> Lights::sampleEnvironment(const Vec2& u) const {
   return LightSample{sample->wi, kInfinity, sample->radiance, sample->pdf, std::nullopt};
 }
 
-std::optional<LightSample> Lights::sample(const Vec3& point, float choice, const Vec2& u) const {
+std::optional<LightSample> Lights::sample(const Vec3& point, double choice, const Vec2& u) const {
   if (empty()) return std::nullopt;
   const std::size_t light = choice_.sample(choice);
   const auto sampleChosen = [&] {
@@ -207,7 +207,7 @@ float Lights::environmentPdf(const Vec3& direction) const {
   return choice > 0.0f ? choice * nextEvent_->pdf(direction) : 0.0f;
 }
 
-std::optional<EmittedPhoton> Lights::areaPhoton(const AreaLight& light, float choice, const Vec2& u1,
+std::optional<EmittedPhoton> Lights::areaPhoton(const AreaLight& light, double choice, const Vec2& u1,
                                                 const Vec2& u2) const {
   const PointSample sample = samplePoint(light, choice, u1);
   const Vec3 direction = Frame::fromNormal(sample.point.normal).toWorld(squareToCosineHemisphere(u2));
@@ -226,7 +226,7 @@ Vec2 Lights::photonCoordinates(const Vec3& point, const Vec3& wi) const {
   return Vec2(local.head<2>().squaredNorm(), azimuth - std::floor(azimuth)).cwiseMin(kOneMinusEpsilon);
 }
 
-std::optional<EmittedPhoton> Lights::samplePhoton(float choice, const Vec2& u1, const Vec2& u2) const {
+std::optional<EmittedPhoton> Lights::samplePhoton(double choice, const Vec2& u1, const Vec2& u2) const {
   const std::size_t light = choice_.sample(choice);
   std::optional<EmittedPhoton> photon;
   if (light < areas_.size()) {

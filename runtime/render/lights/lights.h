@@ -51,11 +51,12 @@ class Lights {
   /// Whether there is no light; then nothing may be sampled.
   bool empty() const { return choice_.total() <= 0; }
 
-  /// Chooses a light, then a direction towards it; choice uniform in [0,1), u in [0,1)². nullopt: a sample of value
+  /// Chooses a light, then a direction towards it; choice uniform in [0,1), with enough
+  /// random bits for the light and the triangle of a mesh (Rng::uniformDouble), u in [0,1)². nullopt: a sample of value
   /// zero, for example if the point is behind the light. Spheres are sampled by solid angle from outside, other
   /// surfaces by area, the environment by radiance above its mean: the rest is left to BSDF sampling, so that the two
   /// have to be combined.
-  std::optional<LightSample> sample(const Vec3& point, float choice, const Vec2& u) const;
+  std::optional<LightSample> sample(const Vec3& point, double choice, const Vec2& u) const;
 
   /// The density with which sample finds, from `point`, the direction towards `hit` on a light; 0 if the hit is not on
   /// the front side of a light.
@@ -69,7 +70,7 @@ class Lights {
   /// solid angle that they light, the environment by radiance. Photons from the environment and from directional lights
   /// start uniformly on the disc to which the bounding sphere of the scene projects in that direction. Must not be
   /// called if empty(). nullopt: a photon of zero power.
-  std::optional<EmittedPhoton> samplePhoton(float choice, const Vec2& u1, const Vec2& u2) const;
+  std::optional<EmittedPhoton> samplePhoton(double choice, const Vec2& u1, const Vec2& u2) const;
 
   /// A photon from a direction sampled elsewhere (by a learnt density, for example), otherwise as in samplePhoton; its
   /// power is not divided by the probability of choosing the environment.
@@ -94,10 +95,10 @@ class Lights {
     SurfacePoint point;
     float areaDensity;
   };
-  PointSample samplePoint(const AreaLight& light, float choice, const Vec2& u) const;
-  std::optional<LightSample> sampleArea(const AreaLight& light, const Vec3& point, float choice, const Vec2& u) const;
+  PointSample samplePoint(const AreaLight& light, double choice, const Vec2& u) const;
+  std::optional<LightSample> sampleArea(const AreaLight& light, const Vec3& point, double choice, const Vec2& u) const;
   std::optional<LightSample> sampleEnvironment(const Vec2& u) const;
-  std::optional<EmittedPhoton> areaPhoton(const AreaLight& light, float choice, const Vec2& u1, const Vec2& u2) const;
+  std::optional<EmittedPhoton> areaPhoton(const AreaLight& light, double choice, const Vec2& u1, const Vec2& u2) const;
 
   void choose(const std::vector<double>& powers);
 

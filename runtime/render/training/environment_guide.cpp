@@ -43,7 +43,7 @@ void EnvironmentGuide::update() {
   bins_ = DiscreteDistribution(weights_);
 }
 
-std::optional<EmittedPhoton> EnvironmentGuide::sample(float choice, const Vec2& u1, const Vec2& u2) const {
+std::optional<EmittedPhoton> EnvironmentGuide::sample(double choice, const Vec2& u1, const Vec2& u2) const {
   if (!(bins_.total() > 0)) {
     const std::optional<EnvironmentSample> from = environment_.sample(u1);
     if (!from) return std::nullopt;

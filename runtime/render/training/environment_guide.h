@@ -27,7 +27,7 @@ class EnvironmentGuide {
 
   /// Samples a photon from the environment; its power is not divided by the probability of choosing the environment.
   /// nullopt: a photon of zero power.
-  std::optional<EmittedPhoton> sample(float choice, const Vec2& u1, const Vec2& u2) const;
+  std::optional<EmittedPhoton> sample(double choice, const Vec2& u1, const Vec2& u2) const;
 
  private:
   static constexpr int kBlockColumns = 64, kBlockRows = 32;

@@ -67,7 +67,7 @@ void ImportonWalk::escape() {
 
 void ImportonWalk::addDirectLight(const SurfaceHit& hit, const GuidedSampler::Vertex& vertex, float smoothFraction) {
   if (!wishes_.uses && !wishes_.samples && !wishes_.fractions) return;
-  const float choice = rng_.uniform();
+  const double choice = rng_.uniformDouble();
   const std::optional<LightSample> light = scene_.lights.sample(hit.position, choice, rng_.uniform2());
   if (!light) return;
   const Vec3 wi = hit.frame.toLocal(light->wi);

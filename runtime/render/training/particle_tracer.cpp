@@ -72,14 +72,14 @@ PhotonResult ParticleTracer::tracePhotons(int pass, int count) const {
 }
 
 std::optional<EmittedPhoton> ParticleTracer::emit(Sampler& rng) const {
-  const float environment = guide_ ? scene_.lights.environmentProbability() : 0.0f;
-  const float choice = rng.uniform();
+  const double environment = guide_ ? scene_.lights.environmentProbability() : 0.0;
+  const double choice = rng.uniformDouble();
   const Vec2 u1 = rng.uniform2();
   const Vec2 u2 = rng.uniform2();
   // The environment is the last light: choices below 1 − environment select other lights.
   if (choice < 1 - environment) return scene_.lights.samplePhoton(choice, u1, u2);
   std::optional<EmittedPhoton> photon = guide_->sample((choice - (1 - environment)) / environment, u1, u2);
-  if (photon) photon->power /= environment;
+  if (photon) photon->power /= static_cast<float>(environment);
   return photon;
 }
 
