@@ -47,10 +47,11 @@ Rgb emissionLeftToNee(const RenderScene& scene, const Receiver& receiver, const 
   const float cosine = receiver.cosine(ray.direction);
   const TransmittedRay end = scene.follow(ray, scene.shadowSurfaces);
   const auto left = [&](float emitterPdf) { return Rgb(end.transmittance * (1 - directFraction(cosine, emitterPdf))); };
+  const LightSelection nextEvent = scene.lights.at(LightReceiver{receiver.point.position, receiver.normal});
   if (!end.hit)
-    return left(scene.lights.environmentPdf(ray.direction)) * scene.lights.environmentRadiance(end.last.direction);
+    return left(nextEvent.environmentPdf(ray.direction)) * scene.lights.environmentRadiance(end.last.direction);
   if (!end.hit->emitter || end.bent) return Rgb::Zero();
-  return left(scene.lights.pdf(receiver.point.position, *end.hit)) * emittedRadiance(*end.hit);
+  return left(nextEvent.pdf(*end.hit)) * emittedRadiance(*end.hit);
 }
 
 std::vector<Receiver> receiversOfPaths(const RenderScene& scene, const RayCamera& camera, int count,

@@ -27,6 +27,7 @@
 #include "runtime/render/integrators/path_integrator.h"
 #include "runtime/render/integrators/pilot.h"
 #include "runtime/render/integrators/renderer.h"
+#include "runtime/render/training/light_learning.h"
 #include "runtime/tools/stored_illumination.h"
 #include "runtime/tools/tool.h"
 #include "scenes/camera.h"
@@ -174,12 +175,17 @@ struct RunResult {
   RenderResult render;
   const Guiding& guiding;
   std::uint64_t dropped;
+  double learningLights;  ///< time of learnLightCells in seconds
 
   const TrainingReport& training() const { return guiding.training.report; }
+<<<<<<< HEAD
   IntegratorKind integrator(const RenderJob& job) const {
     return guiding.pilot ? guiding.pilot->best() : job.integrator;
   }
   double seconds() const { return guiding.seconds() + render.total.seconds; }
+=======
+  double seconds() const { return learningLights + training().seconds + render.total.seconds; }
+>>>>>>> 913517d (Choose lights by place: a light tree, tiles of the environment, learnt cells)
 };
 
 /// Times of the steps before training, in seconds.
@@ -229,6 +235,7 @@ nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, c
           {"seconds_embree_build", load.embree},
           {"seconds_restoring_illumination", load.restoring},
           {"seconds_total", run.seconds()},
+          {"seconds_learning_lights", run.learningLights},
           {"seconds_training", run.training().seconds},
           {"seconds_sample_counts", run.guiding.secondsCounts},
           {"seconds_rendering", total.seconds},
@@ -444,10 +451,13 @@ void run(const RenderJob& job) {
   if (mayUseProduct(job.integrator))
     guiding.caches.emplace(job.cacheFolder, lobeRequests(scene), lobefitCommand(job), job.reduction);
   const Stopwatch building;
-  const RenderScene renderScene(scene, job.shadowSurfaces);
+  RenderScene renderScene(scene, job.shadowSurfaces);
   load.building = building.seconds();
   load.embree = renderScene.tracer.buildSeconds();
   const RayCamera camera(scene.camera, scene.filter);
+  const Stopwatch learning;
+  renderScene.lights.use(learnLightCells(renderScene, camera, job.seed));
+  const double learnt = learning.seconds();
   const std::optional<Receiver> receiver = receiverFor(job, renderScene, camera);
   if (job.integrator != IntegratorKind::path) {
     if (!stored) train(job, renderScene, camera, guiding);
@@ -458,8 +468,14 @@ void run(const RenderJob& job) {
 
   const std::unique_ptr<Integrator> integrator = makeIntegrator(job, renderScene, camera, guiding);
   Film film(camera.width(), camera.height());
+<<<<<<< HEAD
   const RenderResult rendered = renderWithProgress(job, camera, *integrator, guiding.seconds(), film, log);
   const RunResult result{rendered, guiding, film.dropped()};
+=======
+  const RenderResult rendered =
+      renderWithProgress(job, camera, *integrator, learnt + guiding.training.report.seconds, film, log);
+  const RunResult result{rendered, guiding, film.dropped(), learnt};
+>>>>>>> 913517d (Choose lights by place: a light tree, tiles of the environment, learnt cells)
   if (result.dropped > 0)
     printWarning(kTool, fmt::format("{} samples were negative or not finite, and were discarded", result.dropped));
   const std::uint64_t hash = pictureHash(scene);

@@ -74,7 +74,7 @@ Moments seen(const Scene& scene, int surfaces, int samples, int maxDepth = 30) {
 TEST_CASE("transmission: light through a pane has the transmittance of a slab") {
   Scene scene = smallReceiver();
   scene.environment = upperHalf();
-  addShape(scene, rectangle({-1e3f, 1, -1e3f}, {0, 0, 2e3f}, {2e3f, 0, 0}),
+  addShape(scene, rectangle({-1e4f, 1, -1e4f}, {0, 0, 2e4f}, {2e4f, 0, 0}),
            addMaterial(scene, glass("thindielectric")));
   const double expected = kAlbedo * slabTransmittance();
   for (const int surfaces : {0, 16}) CHECK(deviation(seen(scene, surfaces, 100000), expected) < kMaxDeviation);
@@ -148,7 +148,7 @@ TEST_CASE("transmission: a point light shines through a pane") {
 TEST_CASE("transmission: the maximum depth counts the surfaces that next-event estimation passes") {
   Scene scene = smallReceiver();
   scene.environment = upperHalf();
-  addShape(scene, rectangle({-1e3f, 1, -1e3f}, {0, 0, 2e3f}, {2e3f, 0, 0}),
+  addShape(scene, rectangle({-1e4f, 1, -1e4f}, {0, 0, 2e4f}, {2e4f, 0, 0}),
            addMaterial(scene, glass("thindielectric")));
   CHECK(seen(scene, 16, 1000, 2).mean() == 0);
   CHECK(seen(scene, 16, 1000, 3).mean() > 0);

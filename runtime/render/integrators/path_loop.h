@@ -99,12 +99,12 @@ class PathLoop {
     const std::optional<SurfaceHit> hit = dark ? firstVisible(path) : scene_.tracer.trace(path.ray);
     if (!hit) {
       if (dark) return false;
-      path.radiance += path.throughput * scene_.lights.environmentRadiance(path.ray.direction) *
-                       path.emissionWeight.ofEnvironment(scene_.lights);
+      path.radiance +=
+          path.throughput * scene_.lights.environmentRadiance(path.ray.direction) * path.emissionWeight.ofEnvironment();
       return false;
     }
     if (hit->emitter && !dark)
-      path.radiance += path.throughput * emittedRadiance(*hit) * path.emissionWeight.ofSurface(scene_.lights, *hit);
+      path.radiance += path.throughput * emittedRadiance(*hit) * path.emissionWeight.ofSurface(*hit);
     if (!hit->bsdf || path.depth >= options_.maxDepth || !sidesAgree(*hit, hit->woWorld, hit->wo)) return false;
     return scatter(path, *hit);
   }
@@ -156,18 +156,27 @@ class PathLoop {
     return static_cast<int>(below) + (count > below && rng.uniform() < count - below ? 1 : 0);
   }
 
+  // A vertex at which paths scatter by the non-delta component with probability 1 − delta.
+  struct Scattering {
+    const SurfaceHit& hit;
+    const typename Guide::Vertex& vertex;
+    const LightSelection lights;
+    float delta;
+  };
+
   bool scatter(Path& path, const SurfaceHit& hit) const {
-    const float deltaFraction = hit.bsdf->deltaProbability(hit.wo, hit.uv);
-    if (deltaFraction >= 1.0f) return survivesByThroughput(path) && scatterDelta(path, hit, deltaFraction);
+    const float delta = hit.bsdf->deltaProbability(hit.wo, hit.uv);
+    if (delta >= 1.0f) return survivesByThroughput(path) && scatterDelta(path, hit, delta);
     const typename Guide::Vertex vertex(sampler_, hit);
     const std::optional<VertexEstimate> estimate =
         options_.counts || path.log ? vertex.estimate() : std::optional<VertexEstimate>();
     const std::optional<SampleCounts> counts = countsAt(path, estimate);
     if (!counts) return false;
+    const Scattering at{hit, vertex, scene_.lights.at(hit), delta};
     const bool logged = path.log && logVertex(path, estimate);
-    addDirectLight(path, hit, vertex, 1.0f - deltaFraction, counts->direct);
+    addDirectLight(path, at, counts->direct);
     if (logged) logDirect(path);
-    return goOn(path, hit, vertex, deltaFraction, counts->continued);
+    return goOn(path, at, counts->continued);
   }
 
   bool logVertex(Path& path, const std::optional<VertexEstimate>& estimate) const {
@@ -186,8 +195,7 @@ class PathLoop {
 
   // Continues the path in `count` directions on average. The last is followed by the caller: returns whether there is
   // one.
-  bool goOn(Path& path, const SurfaceHit& hit, const typename Guide::Vertex& vertex, float deltaFraction,
-            float count) const {
+  bool goOn(Path& path, const Scattering& at, float count) const {
     const int copies = rounded(count, *path.rng);
     if (copies == 0) return false;
     path.throughput /= count;
@@ -197,40 +205,37 @@ class PathLoop {
       Path branch = path;
       branch.rng = &rng;
       branch.radiance = Rgb::Zero();
-      if (scatterAt(branch, hit, vertex, deltaFraction)) follow(branch);
+      if (scatterAt(branch, at)) follow(branch);
       path.radiance += branch.radiance;
     }
-    return scatterAt(path, hit, vertex, deltaFraction);
+    return scatterAt(path, at);
   }
 
-  bool scatterAt(Path& path, const SurfaceHit& hit, const typename Guide::Vertex& vertex, float deltaFraction) const {
-    if (deltaFraction <= 0.0f || path.rng->uniform() >= deltaFraction)
-      return scatterSmooth(path, hit, vertex, 1.0f - deltaFraction);
-    return scatterDelta(path, hit, deltaFraction);
+  bool scatterAt(Path& path, const Scattering& at) const {
+    if (at.delta <= 0.0f || path.rng->uniform() >= at.delta) return scatterSmooth(path, at);
+    return scatterDelta(path, at.hit, at.delta);
   }
 
-  // Next-event estimation with `count` samples on average. fraction: the probability of sampling the non-delta
-  // component.
-  void addDirectLight(Path& path, const SurfaceHit& hit, const typename Guide::Vertex& vertex, float fraction,
-                      float count) const {
+  // Next-event estimation with `count` samples on average.
+  void addDirectLight(Path& path, const Scattering& at, float count) const {
     constexpr int kNumbersOfDirectLight = 3;
     const int samples = rounded(count, *path.rng);
     if (samples == 0) path.rng->skip(kNumbersOfDirectLight);
     Rgb sum = Rgb::Zero();
-    if (samples > 0) sum += directLight(path, hit, vertex, fraction, *path.rng);
+    if (samples > 0) sum += directLight(path, at, *path.rng);
     for (int i = 1; i < samples; ++i) {
       Sampler rng = path.rng->branch();
-      sum += directLight(path, hit, vertex, fraction, rng);
+      sum += directLight(path, at, rng);
     }
     path.radiance += path.throughput * sum / count;
   }
 
   // One sample of next-event estimation: the light that is scattered at the vertex, without the path's throughput.
-  Rgb directLight(const Path& path, const SurfaceHit& hit, const typename Guide::Vertex& vertex, float fraction,
-                  Sampler& rng) const {
+  Rgb directLight(const Path& path, const Scattering& at, Sampler& rng) const {
     const Rgb none = Rgb::Zero();
+    const SurfaceHit& hit = at.hit;
     const double choice = rng.stratifiedDouble();
-    const std::optional<LightSample> light = scene_.lights.sample(hit.position, choice, rng.stratified2());
+    const std::optional<LightSample> light = at.lights.sample(choice, rng.stratified2());
     if (!light) return none;
     const Vec3 wi = hit.frame.toLocal(light->wi);
     if (!sidesAgree(hit, light->wi, wi)) return none;
@@ -239,17 +244,18 @@ class PathLoop {
     const ArrivingLight arriving = scene_.arriving(hit, *light, options_.maxDepth - path.depth - 1);
     path.statistics->shadowRays += static_cast<std::uint64_t>(arriving.rays);
     if (!(arriving.radiance.maxCoeff() > 0.0f)) return none;
-    const float weight = light->delta ? 1.0f : misWeight(light->pdf, fraction * vertex.pdf(wi));
+    const float weight = light->delta ? 1.0f : misWeight(light->pdf, (1.0f - at.delta) * at.vertex.pdf(wi));
     return f * arriving.radiance * (std::abs(wi.z()) * weight / light->pdf);
   }
 
-  bool scatterSmooth(Path& path, const SurfaceHit& hit, const typename Guide::Vertex& vertex, float fraction) const {
-    const std::optional<BsdfSample> sample = vertex.sample(*path.rng, *path.statistics);
+  bool scatterSmooth(Path& path, const Scattering& at) const {
+    const SurfaceHit& hit = at.hit;
+    const std::optional<BsdfSample> sample = at.vertex.sample(*path.rng, *path.statistics);
     if (!sample) return false;
-    const float pdf = fraction * sample->pdf;
+    const float pdf = (1.0f - at.delta) * sample->pdf;
     path.eta2 *= sample->eta * sample->eta;
     if (!continueAlong(path, hit, sample->wi, sample->f * (std::abs(sample->wi.z()) / pdf))) return false;
-    path.emissionWeight.scattered(hit.position, path.ray.direction, pdf);
+    path.emissionWeight.scattered(at.lights, path.ray.direction, pdf);
     return true;
   }
 

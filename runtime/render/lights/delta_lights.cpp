@@ -88,7 +88,7 @@ double fluxOf(const DirectionalLight& light, const SceneSphere& sphere) {
 }
 
 EmittedPhoton photon(const Ray& ray, const Rgb& power, bool far) {
-  return {ray, power, far, kInfinity, Vec3::Zero()};
+  return {ray, power, far, -1, true};
 }
 
 std::optional<EmittedPhoton> emitFrom(const PointLight& light, const SceneSphere&, const Vec2&, const Vec2& u) {

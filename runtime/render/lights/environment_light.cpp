@@ -1,5 +1,6 @@
 #include "runtime/render/lights/environment_light.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace lobe {
@@ -60,8 +61,9 @@ Eigen::Vector2i EnvironmentLight::pixelOf(const Vec3& direction) const {
   return {std::min(static_cast<int>(p.x()), width_ - 1), std::min(static_cast<int>(p.y()), height_ - 1)};
 }
 
-// Columns wrap around, rows end at the poles. Pixels outside the block have weight 0.
-EnvironmentLight::Texel EnvironmentLight::interpolate(const Vec2& point, const PixelBlock& block) const {
+// Columns wrap around, rows end at the poles.
+template <class Scale>
+EnvironmentLight::Texel EnvironmentLight::interpolate(const Vec2& point, const Scale& scale) const {
   const float px = point.x() - 0.5f;
   const float py = point.y() - 0.5f;
   const float floorX = std::floor(px);
@@ -74,11 +76,27 @@ EnvironmentLight::Texel EnvironmentLight::interpolate(const Vec2& point, const P
   const int bottom = std::clamp(static_cast<int>(floorY) + 1, 0, height_ - 1);
   const auto value = [&](int x, int y) {
     Texel result = texel(x, y);
-    if (x < block.x0 || x >= block.x1 || y < block.y0 || y >= block.y1) result.w() = 0.0f;
+    result.w() *= scale(x, y);
     return result;
   };
   return (1.0f - fy) * ((1.0f - fx) * value(left, top) + fx * value(right, top)) +
          fy * ((1.0f - fx) * value(left, bottom) + fx * value(right, bottom));
+}
+
+// Pixels outside the block have weight 0.
+EnvironmentLight::Texel EnvironmentLight::interpolate(const Vec2& point, const PixelBlock& block) const {
+  return interpolate(point, [&block](int x, int y) {
+    return x < block.x0 || x >= block.x1 || y < block.y0 || y >= block.y1 ? 0.0f : 1.0f;
+  });
+}
+
+// The weights of each tile sum to its probability.
+EnvironmentLight::Texel EnvironmentLight::interpolate(const Vec2& point,
+                                                      const CumulativeProbabilities& probabilities) const {
+  return interpolate(point, [&](int x, int y) {
+    const int tile = tileOf_[static_cast<std::size_t>(y) * width_ + x];
+    return probabilities[tile] * tiles_[tile].inverse;
+  });
 }
 
 Vec3 EnvironmentLight::direction(const Coordinates& c) const {
@@ -106,16 +124,16 @@ int EnvironmentLight::sampleRow(const PixelBlock& block, float& u) const {
   return block.y0 + static_cast<int>(DiscreteDistribution(masses).sample(u));
 }
 
-// Converts an interpolated weight to a density over solid angle.
-float EnvironmentLight::density(float weight, float sine, const PixelBlock& block) const {
+// Converts an interpolated weight to a density over solid angle. total: the sum of the weights.
+float EnvironmentLight::density(float weight, float sine, double total) const {
   if (sine <= 0.0f) return 0.0f;
-  return static_cast<float>(weight * texels_.size() / (blockWeight(block) * 2.0 * kPi * kPi * sine));
+  return static_cast<float>(weight * texels_.size() / (total * 2.0 * kPi * kPi * sine));
 }
 
 float EnvironmentLight::pdf(const PixelBlock& block, const Vec3& direction) const {
   if (constant()) return 0.25f * kInvPi;
   const Coordinates c = coordinates(direction);
-  return density(interpolate(c.point, block).w(), c.sine, block);
+  return density(interpolate(c.point, block).w(), c.sine, blockWeight(block));
 }
 
 float EnvironmentLight::pdf(const Vec3& direction) const {
@@ -131,17 +149,87 @@ std::optional<EnvironmentSample> EnvironmentLight::sample(const PixelBlock& bloc
   Vec2 rest = u;
   const int y = sampleRow(block, rest.y());
   const auto x = static_cast<int>(rows_[y].sample(rest.x(), block.x0, block.x1));
-  // The contribution of a pixel to the interpolated image is a tent around its centre. It wraps around at the seam and
-  // is reflected at the poles.
-  Coordinates c{{x + 0.5f + sampleTent(rest.x()), y + 0.5f + sampleTent(rest.y())}, 0.0f};
+  const Coordinates c = pointNear(x, y, rest);
+  const Texel found = interpolate(c.point, block);
+  const float pdf = density(found.w(), c.sine, blockWeight(block));
+  if (!(pdf > 0.0f)) return std::nullopt;
+  return EnvironmentSample{direction(c), found.head<3>(), pdf};
+}
+
+// The contribution of a pixel to the interpolated image is a tent around its centre. It wraps around at the seam and is
+// reflected at the poles.
+EnvironmentLight::Coordinates EnvironmentLight::pointNear(int x, int y, const Vec2& u) const {
+  Coordinates c{{x + 0.5f + sampleTent(u.x()), y + 0.5f + sampleTent(u.y())}, 0.0f};
   if (c.point.x() < 0.0f) c.point.x() += width_;
   if (c.point.x() >= width_) c.point.x() -= width_;
   c.point.y() = c.point.y() > height_ ? 2.0f * height_ - c.point.y() : std::abs(c.point.y());
   c.sine = std::sin(kPi * c.point.y() / height_);
-  const Texel found = interpolate(c.point, block);
-  const float pdf = density(found.w(), c.sine, block);
+  return c;
+}
+
+// Halves the tile with the largest product of weight and extent along its longer side, so that the sun does not use up
+// all tiles. Neighbouring tiles stay neighbours in the sequence, which keeps samples of the choice stratified.
+void EnvironmentLight::divide(int most) {
+  if (constant()) return;
+  std::vector<PixelBlock> blocks{everything()};
+  const auto priority = [&](const PixelBlock& b) {
+    const int extent = std::max(b.x1 - b.x0, b.y1 - b.y0);
+    return extent > 1 ? blockWeight(b) * extent : 0.0;
+  };
+  std::vector<double> priorities{priority(blocks[0])};
+  while (static_cast<int>(blocks.size()) < most) {
+    const auto widest = std::ranges::max_element(priorities) - priorities.begin();
+    if (!(priorities[widest] > 0)) break;
+    PixelBlock a = blocks[widest], b = a;
+    if (a.x1 - a.x0 > a.y1 - a.y0)
+      a.x1 = b.x0 = (a.x0 + a.x1) / 2;
+    else
+      a.y1 = b.y0 = (a.y0 + a.y1) / 2;
+    blocks[widest] = a;
+    priorities[widest] = priority(a);
+    blocks.insert(blocks.begin() + widest + 1, b);
+    priorities.insert(priorities.begin() + widest + 1, priority(b));
+  }
+  tileOf_.assign(texels_.size(), 0);
+  for (const PixelBlock& b : blocks) {
+    if (!(blockWeight(b) > 0)) continue;
+    std::vector<double> masses;
+    for (int y = b.y0; y < b.y1; ++y) {
+      masses.push_back(rows_[y].mass(b.x0, b.x1));
+      const auto row = tileOf_.begin() + static_cast<std::ptrdiff_t>(y) * width_;
+      std::fill(row + b.x0, row + b.x1, static_cast<std::uint16_t>(tiles_.size()));
+    }
+    const DiscreteDistribution rows(masses);
+    tiles_.push_back({b, rows, static_cast<float>(1 / rows.total())});
+  }
+}
+
+double EnvironmentLight::tileFraction(int tile) const {
+  return tiles_.empty() ? 1.0 : tiles_[tile].rows.total() / columns_.total();
+}
+
+std::optional<EnvironmentSample> EnvironmentLight::sample(int tile, const Vec2& u,
+                                                          const CumulativeProbabilities& probabilities) const {
+  if (tiles_.empty()) {
+    std::optional<EnvironmentSample> whole = sample(u);
+    if (whole) whole->pdf *= probabilities[0];
+    return whole;
+  }
+  const Tile& chosen = tiles_[tile];
+  Vec2 rest = u;
+  const int y = chosen.block.y0 + static_cast<int>(chosen.rows.sample(rest.y()));
+  const auto x = static_cast<int>(rows_[y].sample(rest.x(), chosen.block.x0, chosen.block.x1));
+  const Coordinates c = pointNear(x, y, rest);
+  const Texel found = interpolate(c.point, probabilities);
+  const float pdf = density(found.w(), c.sine, 1.0);
   if (!(pdf > 0.0f)) return std::nullopt;
   return EnvironmentSample{direction(c), found.head<3>(), pdf};
+}
+
+float EnvironmentLight::pdf(const Vec3& direction, const CumulativeProbabilities& probabilities) const {
+  if (tiles_.empty()) return probabilities[0] * pdf(direction);
+  const Coordinates c = coordinates(direction);
+  return density(interpolate(c.point, probabilities).w(), c.sine, 1.0);
 }
 
 }  // namespace lobe

@@ -3,6 +3,7 @@
 // interpolation of pixel weights (luminance × sinθ at the pixel's centre), so that radiance / density is nearly
 // constant.
 
+#include <cstdint>
 #include <optional>
 
 #include "runtime/core/distribution.h"
@@ -14,6 +15,17 @@ struct EnvironmentSample {
   Vec3 wi;  ///< unit, world space, towards the environment
   Rgb radiance;
   float pdf;  ///< over solid angle, > 0
+};
+
+/// The probabilities of consecutive choices, cumulative: choice i has cumulative[i + 1] − cumulative[i].
+class CumulativeProbabilities {
+ public:
+  explicit CumulativeProbabilities(const float* cumulative = nullptr) : cumulative_(cumulative) {}
+  float operator[](int i) const { return cumulative_[i + 1] - cumulative_[i]; }
+  CumulativeProbabilities from(int first) const { return CumulativeProbabilities(cumulative_ + first); }
+
+ private:
+  const float* cumulative_;
 };
 
 /// Pixels of columns [x0, x1) and rows [y0, y1).
@@ -48,6 +60,17 @@ class EnvironmentLight {
   float pdf(const PixelBlock& block, const Vec3& direction) const;
   double blockWeight(const PixelBlock& block) const;
 
+  /// Divides the image into at most `most` tiles of positive weight, smaller ones where there is more weight.
+  void divide(int most);
+  /// At least 1; 1 before divide().
+  int tiles() const { return tiles_.empty() ? 1 : static_cast<int>(tiles_.size()); }
+  /// The fraction of a tile in the weight of the image.
+  double tileFraction(int tile) const;
+  /// Samples a tile in proportion to the weights of its pixels. The density is that of choosing a tile with the given
+  /// probabilities and then a direction in it, which is what pdf returns for any direction. nullopt as above.
+  std::optional<EnvironmentSample> sample(int tile, const Vec2& u, const CumulativeProbabilities& probabilities) const;
+  float pdf(const Vec3& direction, const CumulativeProbabilities& probabilities) const;
+
   int width() const { return width_; }
   int height() const { return height_; }
   /// luminance × sinθ of a pixel.
@@ -66,10 +89,21 @@ class EnvironmentLight {
   bool constant() const { return texels_.size() == 1; }
   PixelBlock everything() const { return {0, 0, width_, height_}; }
 
+  struct Tile {
+    PixelBlock block;
+    DiscreteDistribution rows;
+    float inverse;  // of the sum of the weights
+  };
+
   Coordinates coordinates(const Vec3& direction) const;
   Vec3 direction(const Coordinates& c) const;
+  /// The image at a point in pixels. The weight of each pixel is multiplied by scale(x, y).
+  template <class Scale>
+  Texel interpolate(const Vec2& point, const Scale& scale) const;
   Texel interpolate(const Vec2& point, const PixelBlock& block) const;
-  float density(float weight, float sine, const PixelBlock& block) const;
+  Texel interpolate(const Vec2& point, const CumulativeProbabilities& probabilities) const;
+  float density(float weight, float sine, double total) const;
+  Coordinates pointNear(int x, int y, const Vec2& u) const;
   int sampleRow(const PixelBlock& block, float& u) const;
 
   int width_, height_;
@@ -78,6 +112,8 @@ class EnvironmentLight {
   std::vector<DiscreteDistribution> rows_;
   DiscreteDistribution columns_;  // over rows: the weights of rows_
   double flux_ = 0;
+  std::vector<Tile> tiles_;
+  std::vector<std::uint16_t> tileOf_;  // by pixel
 };
 
 }  // namespace lobe

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "runtime/render/geometry/shape_geometry.h"
 #include "runtime/render/lights/delta_lights.h"
@@ -84,30 +85,37 @@ Lights::Lights(const Scene& scene, const Eigen::AlignedBox3f& bounds)
   if (!bounds.isEmpty()) {
     sphere_ = {bounds.center(), 0.5f * bounds.diagonal().norm()};
   }
-  std::vector<double> powers;
   for (std::size_t i = 0; i < scene.shapes.size(); ++i) {
-    const Shape& shape = scene.shapes[i];
-    if (!shape.emitter) continue;
-    AreaLight light{&shape, 0.0f, {}};
-    if (const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry)) {
-      const std::vector<double> areas = areasOfTriangles(*mesh);
-      light.triangles = DiscreteDistribution(areas);
-      light.area = static_cast<float>(light.triangles.total());
-    } else {
-      light.area = areaOfAnalytic(shape.geometry);
-    }
+    if (!scene.shapes[i].emitter) continue;
+    AreaLight light = areaLight(scene.shapes[i]);
     if (!(light.area > 0.0f)) continue;
     lightOfShape_[i] = static_cast<int>(areas_.size());
-    powers.push_back(static_cast<double>(kPi) * light.area * luminance(shape.emitter->radiance->mean()));
     areas_.push_back(std::move(light));
   }
-  for (const DeltaLight& light : scene.lights) powers.push_back(powerOf(light, sphere_));
   if (scene.environment) {
     environment_.emplace(*scene.environment);
     nextEvent_.emplace(EnvironmentLight::forNextEventEstimation(*scene.environment));
-    powers.push_back(environment_->flux() * kPi * sphere_.radius * sphere_.radius);
   }
-  choose(powers);
+  const std::vector<double> all = powers();
+  choose(all);
+  if (!empty()) makeClusters(all);
+}
+
+Lights::AreaLight Lights::areaLight(const Shape& shape) const {
+  const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry);
+  if (!mesh) return {&shape, areaOfAnalytic(shape.geometry), {}};
+  DiscreteDistribution triangles(areasOfTriangles(*mesh));
+  const auto area = static_cast<float>(triangles.total());
+  return {&shape, area, std::move(triangles)};
+}
+
+std::vector<double> Lights::powers() const {
+  std::vector<double> all;
+  for (const AreaLight& light : areas_)
+    all.push_back(static_cast<double>(kPi) * light.area * luminance(light.shape->emitter->radiance->mean()));
+  for (const DeltaLight& light : scene_.lights) all.push_back(powerOf(light, sphere_));
+  if (environment_) all.push_back(environment_->flux() * kPi * sphere_.radius * sphere_.radius);
+  return all;
 }
 
 // Probability with which a light is chosen uniformly instead of by power. Power does not account for distance: a lamp
@@ -128,6 +136,127 @@ void Lights::choose(const std::vector<double>& powers) {
                                                      kUniformFraction / static_cast<double>(shining))
                                 : 0.0f);
   choice_ = DiscreteDistribution(weights);
+}
+
+namespace {
+
+/// Upper bounds of the number of clusters of lights at finite distance, and of tiles of the environment.
+constexpr std::size_t kMaxTreeClusters = 64;
+constexpr int kMaxTiles = 128;
+
+/// The nodes of a tree that divide its lights into at most `most` groups, in the order of the tree. Strong and extended
+/// nodes are divided first.
+std::vector<int> cut(const LightTree& tree, std::size_t most) {
+  if (tree.empty()) return {};
+  std::vector<int> nodes{LightTree::kRoot};
+  const auto priority = [&](int node) { return tree.children(node) ? tree.power(node) * tree.radius(node) : -1.0f; };
+  while (nodes.size() < most) {
+    const auto largest = std::ranges::max_element(nodes, {}, priority);
+    const auto below = tree.children(*largest);
+    if (!below) break;
+    *largest = below->first;
+    nodes.push_back(below->second);
+  }
+  std::ranges::sort(nodes);
+  return nodes;
+}
+
+/// The cone that contains the normals of a mesh.
+void setNormals(const TriangleMesh& mesh, LightBounds& bounds) {
+  Vec3 sum = Vec3::Zero();
+  std::vector<Vec3> normals;
+  for (const auto& [i, j, k] : mesh.triangles) {
+    const Vec3& a = mesh.positions[i];
+    const Vec3 normal = (mesh.positions[j] - a).stableNormalized().cross((mesh.positions[k] - a).stableNormalized());
+    if (!(normal.squaredNorm() > 0.0f)) continue;
+    normals.push_back(normal.normalized());
+    sum += normals.back();
+  }
+  if (!(sum.norm() > 0.0f)) return;
+  bounds.axis = sum.normalized();
+  bounds.normalCosine = 1.0f;
+  // A little wider, because of rounding.
+  for (const Vec3& normal : normals) bounds.normalCosine = std::min(bounds.normalCosine, normal.dot(bounds.axis));
+  bounds.normalCosine = std::max(-1.0f, bounds.normalCosine - 1e-5f);
+}
+
+LightBounds boundsOfShape(const Geometry& geometry) {
+  LightBounds bounds;
+  if (const auto* mesh = std::get_if<TriangleMesh>(&geometry)) {
+    bounds.box = boundsOf(*mesh);
+    setNormals(*mesh, bounds);
+  } else if (const auto* disk = std::get_if<Disk>(&geometry)) {
+    bounds.box = boundsOf(*disk);
+    bounds.axis = pointOnDisk(*disk, 0, 0).normal;
+    bounds.normalCosine = 1.0f;
+  } else if (const auto* sphere = std::get_if<Sphere>(&geometry)) {
+    bounds.box = boundsOf(*sphere);
+  } else if (const auto* cylinder = std::get_if<Cylinder>(&geometry)) {
+    bounds.box = boundsOf(*cylinder);
+  }
+  return bounds;
+}
+
+// Delta lights have a cone of axes, beyond which nothing is emitted.
+LightBounds boundsOfDelta(const PointLight& light) {
+  return {{light.position, light.position}};
+}
+LightBounds boundsOfDelta(const SpotLight& light) {
+  return {{light.position, light.position}, light.direction, std::cos(light.cutoff), 1.0f};
+}
+LightBounds boundsOfDelta(const ProjectorLight& light) {
+  return {{light.position, light.position}, light.direction, 0.0f, 1.0f};
+}
+LightBounds boundsOfDelta(const DirectionalLight&) {
+  return {};  // not in the tree
+}
+
+}  // namespace
+
+LightBounds Lights::boundsForTree(int light, double power) const {
+  LightBounds bounds = isArea(light) ? boundsOfShape(areas_[light].shape->geometry)
+                                     : std::visit([](const auto& l) { return boundsOfDelta(l); }, deltaLight(light));
+  bounds.power = power;
+  return bounds;
+}
+
+void Lights::makeClusters(const std::vector<double>& powers) {
+  const auto localLights = static_cast<int>(areas_.size() + scene_.lights.size());
+  std::vector<LightBounds> bounds;
+  for (int i = 0; i < localLights; ++i) bounds.push_back(boundsForTree(i, powers[i]));
+  tree_ = LightTree(bounds);
+  clusterOf_.assign(localLights, -1);
+  std::vector<double> probabilities;
+  const auto add = [&](const Cluster& cluster, const std::vector<int>& lights) {
+    double sum = 0;
+    for (const int light : lights) {
+      clusterOf_[light] = clusters();
+      sum += choice_.probability(light);
+    }
+    probabilities.push_back(sum);
+    clusters_.push_back(cluster);
+  };
+  for (const int node : cut(tree_, kMaxTreeClusters)) add({.node = node}, tree_.lightsOf(node));
+  for (int i = 0; i < localLights; ++i)
+    if (powers[i] > 0 && bounds[i].box.isEmpty()) add({.light = i}, {i});
+  if (environmentProbability() > 0) {
+    nextEvent_->divide(kMaxTiles);
+    for (int tile = 0; tile < nextEvent_->tiles(); ++tile) {
+      probabilities.push_back(environmentProbability() * nextEvent_->tileFraction(tile));
+      clusters_.push_back({.tile = tile});
+    }
+  }
+  prior_ = cumulative(probabilities);
+}
+
+float Lights::importance(int cluster, const LightReceiver& at) const {
+  const int node = clusters_[cluster].node;
+  return node >= 0 ? tree_.importance(node, at) : prior(cluster);
+}
+
+LightReceiver Lights::receiver(const SurfaceHit& hit) {
+  const Vec3 normal = hit.normal.dot(hit.woWorld) < 0 ? Vec3(-hit.normal) : hit.normal;
+  return {hit.position, hit.bsdf && hit.bsdf->transmits() ? Vec3(Vec3::Zero()) : normal};
 }
 
 Lights::PointSample Lights::samplePoint(const AreaLight& light, double choice, const Vec2& u) const {
@@ -167,44 +296,75 @@ std::optional<LightSample> Lights::sampleArea(const AreaLight& light, const Vec3
   return result;
 }
 
-std::optional<LightSample> Lights::sampleEnvironment(const Vec2& u) const {
-  const std::optional<EnvironmentSample> sample = nextEvent_->sample(u);
+std::optional<LightSample> Lights::sampleLight(int light, const Vec3& point, double choice, const Vec2& u) const {
+  return isArea(light) ? sampleArea(areas_[light], point, choice, u) : illuminate(deltaLight(light), point);
+}
+
+float Lights::pdfOfArea(const AreaLight& light, const Vec3& point, const SurfaceHit& hit) const {
+  if (const auto* sphere = std::get_if<Sphere>(&light.shape->geometry))
+    if (const std::optional<Cone> cone = coneOf(*sphere, point)) return sphere->flipped ? 0.0f : coneDensity(*cone);
+  const float distance2 = (hit.position - point).squaredNorm();
+  return toSolidAngle(1.0f / light.area, distance2, hit.normal.dot(hit.woWorld));
+}
+
+int LightSelection::chooseCluster(double& choice) const {
+  constexpr double kMost = 1 - std::numeric_limits<double>::epsilon() / 2;
+  const int clusters = lights_->clusters();
+  if (clusters <= 1) return 0;
+  const float* const above = std::upper_bound(probabilities_ + 1, probabilities_ + clusters, choice);
+  const double low = above[-1];
+  choice = std::clamp((choice - low) / (above[0] - low), 0.0, kMost);
+  return static_cast<int>(above - probabilities_) - 1;
+}
+
+std::optional<LightSample> LightSelection::sample(double choice, const Vec2& u) const {
+  const int cluster = chooseCluster(choice);
+  return sample(cluster, choice, u);
+}
+
+std::optional<LightSample> LightSelection::sample(int cluster, double choice, const Vec2& u) const {
+  if (lights_->empty()) return std::nullopt;
+  const auto& [node, distant, tile] = lights_->clusters_[cluster];
+  if (tile >= 0) return sampleTile(cluster, tile, u);
+  LightTree::Choice chosen{distant, 1.0f};
+  if (node >= 0) {
+    const std::optional<LightTree::Choice> below = lights_->tree_.sample(node, at_, choice);
+    if (!below) return std::nullopt;
+    chosen = *below;
+  }
+  std::optional<LightSample> result = lights_->sampleLight(chosen.light, at_.position, choice, u);
+  if (result) result->pdf *= clusterProbability(cluster) * chosen.probability;
+  return result;
+}
+
+std::optional<LightSample> LightSelection::sampleTile(int cluster, int tile, const Vec2& u) const {
+  const CumulativeProbabilities tiles = CumulativeProbabilities(probabilities_).from(cluster - tile);
+  const std::optional<EnvironmentSample> sample = lights_->nextEvent_->sample(tile, u, tiles);
   if (!sample) return std::nullopt;
   return LightSample{sample->wi, kInfinity, sample->radiance, sample->pdf, std::nullopt};
 }
 
-std::optional<LightSample> Lights::sample(const Vec3& point, double choice, const Vec2& u) const {
-  if (empty()) return std::nullopt;
-  const std::size_t light = choice_.sample(choice);
-  const auto sampleChosen = [&] {
-    if (light < areas_.size()) return sampleArea(areas_[light], point, choice, u);
-    const std::size_t delta = light - areas_.size();
-    return delta < scene_.lights.size() ? illuminate(scene_.lights[delta], point) : sampleEnvironment(u);
-  };
-  std::optional<LightSample> result = sampleChosen();
-  if (result) result->pdf *= choice_.probability(light);
-  return result;
+float LightSelection::probability(int light) const {
+  const int cluster = lights_->clusterOf_[light];
+  if (cluster < 0) return 0.0f;
+  const int node = lights_->clusters_[cluster].node;
+  return clusterProbability(cluster) * (node >= 0 ? lights_->tree_.probability(node, at_, light) : 1.0f);
 }
 
-float Lights::pdf(const Vec3& point, const SurfaceHit& hit) const {
-  const int light = lightOfShape_[hit.shape];
-  if (light < 0 || hit.normal.dot(hit.woWorld) <= 0.0f || empty()) return 0.0f;
-  const AreaLight& area = areas_[light];
-  const float choice = choice_.probability(light);
-  if (const auto* sphere = std::get_if<Sphere>(&area.shape->geometry))
-    if (const std::optional<Cone> cone = coneOf(*sphere, point))
-      return sphere->flipped ? 0.0f : choice * coneDensity(*cone);
-  const float distance2 = (hit.position - point).squaredNorm();
-  return choice * toSolidAngle(1.0f / area.area, distance2, hit.normal.dot(hit.woWorld));
+float LightSelection::pdf(const SurfaceHit& hit) const {
+  const int light = lights_->lightOfShape_[hit.shape];
+  if (light < 0 || hit.normal.dot(hit.woWorld) <= 0.0f || lights_->empty()) return 0.0f;
+  return probability(light) * lights_->pdfOfArea(lights_->areas_[light], at_.position, hit);
+}
+
+float LightSelection::environmentPdf(const Vec3& direction) const {
+  if (!(lights_->environmentProbability() > 0.0f)) return 0.0f;
+  const int first = lights_->clusters() - lights_->nextEvent_->tiles();
+  return lights_->nextEvent_->pdf(direction, CumulativeProbabilities(probabilities_).from(first));
 }
 
 Rgb Lights::environmentRadiance(const Vec3& direction) const {
   return environment_ ? environment_->radiance(direction) : Rgb(Rgb::Zero());
-}
-
-float Lights::environmentPdf(const Vec3& direction) const {
-  const float choice = environmentProbability();
-  return choice > 0.0f ? choice * nextEvent_->pdf(direction) : 0.0f;
 }
 
 std::optional<EmittedPhoton> Lights::areaPhoton(const AreaLight& light, double choice, const Vec2& u1,
@@ -212,12 +372,14 @@ std::optional<EmittedPhoton> Lights::areaPhoton(const AreaLight& light, double c
   const PointSample sample = samplePoint(light, choice, u1);
   const Vec3 direction = Frame::fromNormal(sample.point.normal).toWorld(squareToCosineHemisphere(u2));
   const Rgb power = light.shape->emitter->radiance->eval(sample.point.uv) * (kPi / sample.areaDensity);
-  return EmittedPhoton{spawnRay(sample.point, direction), power, false, sample.areaDensity, sample.point.normal};
+  const int number = lightOfShape_[light.shape - scene_.shapes.data()];
+  return EmittedPhoton{
+      spawnRay(sample.point, direction), power, false, number, false, sample.areaDensity, sample.point.normal};
 }
 
 EmittedPhoton Lights::photonFromEnvironment(const EnvironmentSample& from, const Vec2& u) const {
   const Rgb power = from.radiance * (kPi * sphere_.radius * sphere_.radius / from.pdf);
-  return {{sphere_.start(from.wi, u), -from.wi}, power, true, environmentPdf(from.wi), Vec3::Zero()};
+  return {{sphere_.start(from.wi, u), -from.wi}, power, true};
 }
 
 Vec2 Lights::photonCoordinates(const Vec3& point, const Vec3& wi) const {
@@ -231,7 +393,6 @@ std::optional<EmittedPhoton> Lights::samplePhoton(double choice, const Vec2& u1,
   std::optional<EmittedPhoton> photon;
   if (light < areas_.size()) {
     photon = areaPhoton(areas_[light], choice, u1, u2);
-    photon->emitterDensity *= choice_.probability(light);
   } else if (const std::size_t delta = light - areas_.size(); delta < scene_.lights.size()) {
     photon = emit(scene_.lights[delta], sphere_, u1, u2);
   } else if (const std::optional<EnvironmentSample> from = environment_->sample(u1)) {

@@ -1,6 +1,10 @@
 #pragma once
-// All emitters of a scene, chosen mostly in proportion to power, for next-event estimation and for the emission of
-// photons.
+// All emitters of a scene: the choice of a light by place for next-event estimation, and the emission of photons in
+// proportion to power.
+//
+// For next-event estimation, lights form clusters: single lights or nodes of a tree over lights, and tiles of the
+// environment. A cluster is chosen with the probabilities of the cell of the receiver, if they have been learnt
+// (light_learning.h), otherwise by power; the tree then chooses within the cluster.
 
 #include <optional>
 #include <vector>
@@ -9,6 +13,8 @@
 
 #include "runtime/render/geometry/surface_hit.h"
 #include "runtime/render/lights/environment_light.h"
+#include "runtime/render/lights/light_cells.h"
+#include "runtime/render/lights/light_tree.h"
 
 namespace lobe {
 
@@ -25,12 +31,12 @@ struct LightSample {
 
 struct EmittedPhoton {
   Ray ray;
-  Rgb power;  ///< flux / density of choosing light, point and direction
-  bool far;   ///< emitted at infinity: ray.origin is only a starting point outside the scene
-  /// The density with which Lights::sample chooses the origin of the photon, with the choice of the light: over solid
-  /// angle for the environment, over area for surfaces; infinite for delta lights.
-  float emitterDensity;
-  Vec3 normal;  ///< of the emitting surface; zero without a surface
+  Rgb power;              ///< flux / density of choosing light, point and direction
+  bool far;               ///< emitted at infinity: ray.origin is only a starting point outside the scene
+  int light = -1;         ///< the number of a surface that emits, for LightSelection::probability; −1: another light
+  bool delta = false;     ///< of a light that only next-event estimation finds
+  float areaDensity = 0;  ///< with which the point on the surface was sampled
+  Vec3 normal = Vec3::Zero();  ///< of the emitting surface; zero without a surface
 };
 
 /// Bounding sphere of the scene.
@@ -43,6 +49,43 @@ struct SceneSphere {
   Vec3 start(const Vec3& wi, const Vec2& u) const;
 };
 
+class Lights;
+
+/// Next-event estimation at one receiver. The lights must outlive it. A default-constructed object must not be used.
+class LightSelection {
+ public:
+  LightSelection() = default;
+  LightSelection(const Lights& lights, const LightReceiver& at, const float* probabilities)
+      : lights_(&lights), at_(at), probabilities_(probabilities) {}
+
+  /// Chooses a light, then a direction towards it; choice uniform in [0,1), with enough random bits for the light and
+  /// the triangle of a mesh (Rng::uniformDouble), u in [0,1)². nullopt: a sample of value zero, for example if the
+  /// point is behind the light. Spheres are sampled by solid angle from outside, other surfaces by area, the
+  /// environment by radiance above its mean: the rest is left to BSDF sampling, so that the two have to be combined.
+  std::optional<LightSample> sample(double choice, const Vec2& u) const;
+
+  /// The density with which sample finds the direction towards `hit` on a light; 0 if the hit is not on the front side
+  /// of a light.
+  float pdf(const SurfaceHit& hit) const;
+  /// The density with which sample finds a direction by choosing the environment.
+  float environmentPdf(const Vec3& direction) const;
+  /// The probability with which sample chooses a light other than the environment.
+  float probability(int light) const;
+
+  /// The two steps of sample: the choice of a cluster, which leaves `choice` uniform in [0,1), and sampling of this
+  /// cluster; the density still includes that choice.
+  int chooseCluster(double& choice) const;
+  std::optional<LightSample> sample(int cluster, double choice, const Vec2& u) const;
+  float clusterProbability(int cluster) const { return CumulativeProbabilities(probabilities_)[cluster]; }
+
+ private:
+  std::optional<LightSample> sampleTile(int cluster, int tile, const Vec2& u) const;
+
+  const Lights* lights_ = nullptr;
+  LightReceiver at_ = {Vec3::Zero(), Vec3::Zero()};
+  const float* probabilities_ = nullptr;  // cumulative, of the clusters
+};
+
 class Lights {
  public:
   /// The scene must outlive the lights. bounds: bounding box of the scene's shapes.
@@ -51,20 +94,25 @@ class Lights {
   /// Whether there is no light; then nothing may be sampled.
   bool empty() const { return choice_.total() <= 0; }
 
-  /// Chooses a light, then a direction towards it; choice uniform in [0,1), with enough
-  /// random bits for the light and the triangle of a mesh (Rng::uniformDouble), u in [0,1)². nullopt: a sample of value
-  /// zero, for example if the point is behind the light. Spheres are sampled by solid angle from outside, other
-  /// surfaces by area, the environment by radiance above its mean: the rest is left to BSDF sampling, so that the two
-  /// have to be combined.
-  std::optional<LightSample> sample(const Vec3& point, double choice, const Vec2& u) const;
+  /// A hit as a receiver: on the side from which its ray came, or on both sides of a surface that transmits light.
+  static LightReceiver receiver(const SurfaceHit& hit);
 
-  /// The density with which sample finds, from `point`, the direction towards `hit` on a light; 0 if the hit is not on
-  /// the front side of a light.
-  float pdf(const Vec3& point, const SurfaceHit& hit) const;
+  /// Next-event estimation at a receiver.
+  LightSelection at(const LightReceiver& receiver) const {
+    return {*this, receiver, cells_.empty() ? prior_.data() : cells_.find(receiver)};
+  }
+  LightSelection at(const SurfaceHit& hit) const { return at(receiver(hit)); }
+
+  /// The number of clusters.
+  int clusters() const { return static_cast<int>(clusters_.size()); }
+  /// The probability of a cluster without learning.
+  float prior(int cluster) const { return CumulativeProbabilities(prior_.data())[cluster]; }
+  /// Estimate of the irradiance from a cluster without occlusion, in units of its own.
+  float importance(int cluster, const LightReceiver& at) const;
+  /// Replaces the probabilities of the clusters by learnt ones; an empty object restores the prior.
+  void use(LightCells cells) { cells_ = std::move(cells); }
 
   Rgb environmentRadiance(const Vec3& direction) const;
-  /// The density with which sample finds a direction by choosing the environment.
-  float environmentPdf(const Vec3& direction) const;
 
   /// Samples a photon in proportion to power: surfaces by area and cosine, point and spot lights uniformly over the
   /// solid angle that they light, the environment by radiance. Photons from the environment and from directional lights
@@ -80,12 +128,13 @@ class Lights {
   Vec2 photonCoordinates(const Vec3& point, const Vec3& wi) const;
 
   const EnvironmentLight* environment() const { return environment_ ? &*environment_ : nullptr; }
-  /// The probability of choosing the environment.
+  /// The probability with which samplePhoton chooses the environment.
   float environmentProbability() const {
     return environment_ && !empty() ? choice_.probability(choice_.size() - 1) : 0.0f;
   }
 
  private:
+  friend class LightSelection;
   struct AreaLight {
     const Shape* shape;
     float area;
@@ -97,10 +146,29 @@ class Lights {
   };
   PointSample samplePoint(const AreaLight& light, double choice, const Vec2& u) const;
   std::optional<LightSample> sampleArea(const AreaLight& light, const Vec3& point, double choice, const Vec2& u) const;
-  std::optional<LightSample> sampleEnvironment(const Vec2& u) const;
   std::optional<EmittedPhoton> areaPhoton(const AreaLight& light, double choice, const Vec2& u1, const Vec2& u2) const;
 
+  /// Sampling of one light, with a density that does not include its choice.
+  std::optional<LightSample> sampleLight(int light, const Vec3& point, double choice, const Vec2& u) const;
+  float pdfOfArea(const AreaLight& light, const Vec3& point, const SurfaceHit& hit) const;
+
+  AreaLight areaLight(const Shape& shape) const;
+  std::vector<double> powers() const;
   void choose(const std::vector<double>& powers);
+  void makeClusters(const std::vector<double>& powers);
+  LightBounds boundsForTree(int light, double power) const;
+  const DeltaLight& deltaLight(int light) const {
+    return scene_.lights[static_cast<std::size_t>(light) - areas_.size()];
+  }
+  bool isArea(int light) const { return static_cast<std::size_t>(light) < areas_.size(); }
+
+  /// Lights that are chosen together: a node of the tree (node ≥ 0), a directional light (light ≥ 0), or a tile of the
+  /// environment.
+  struct Cluster {
+    int node = -1;
+    int light = -1;
+    int tile = -1;
+  };
 
   const Scene& scene_;
   SceneSphere sphere_;
@@ -108,7 +176,12 @@ class Lights {
   std::vector<int> lightOfShape_;  // index into areas_, −1: none
   std::optional<EnvironmentLight> environment_;
   std::optional<EnvironmentLight> nextEvent_;  // with the density of next-event estimation
-  DiscreteDistribution choice_;                // areas_, then the scene's delta lights, then the environment
+  DiscreteDistribution choice_;                // by power: areas_, then the scene's delta lights, then the environment
+  LightTree tree_;                             // over lights at finite distance
+  std::vector<Cluster> clusters_;              // the tiles of the environment are the last ones
+  std::vector<int> clusterOf_;                 // by light; −1: without power
+  std::vector<float> prior_;                   // cumulative probabilities of the clusters
+  LightCells cells_;
 };
 
 }  // namespace lobe

@@ -64,9 +64,10 @@ std::optional<DeltaTransmission> sharedTransmission(const SurfaceHit& hit, const
 /// transmissions.
 class EmissionWeight {
  public:
-  /// The path was scattered into a direction (world space) with a density over solid angle.
-  void scattered(const Vec3& position, const Vec3& direction, float pdf) {
-    position_ = position;
+  /// The path was scattered into a direction (world space) with a density over solid angle, at a vertex with this
+  /// next-event estimation.
+  void scattered(const LightSelection& nextEvent, const Vec3& direction, float pdf) {
+    nextEvent_ = nextEvent;
     direction_ = direction;
     pdf_ = pdf;
     surfaces_ = 0;
@@ -75,16 +76,15 @@ class EmissionWeight {
   /// The path continued by a delta component, in a direction that is local in hit.frame.
   void passed(const SurfaceHit& hit, const Vec3& wi, int shadowSurfaces);
 
-  float ofEnvironment(const Lights& lights) const {
-    return pdf_ > 0 ? misWeight(pdf_, lights.environmentPdf(direction_)) : 1.0f;
-  }
+  float ofEnvironment() const { return pdf_ > 0 ? misWeight(pdf_, nextEvent_.environmentPdf(direction_)) : 1.0f; }
   /// hit: on an area light.
-  float ofSurface(const Lights& lights, const SurfaceHit& hit) const {
-    return pdf_ > 0 && !bent_ ? misWeight(pdf_, lights.pdf(position_, hit)) : 1.0f;
+  float ofSurface(const SurfaceHit& hit) const {
+    return pdf_ > 0 && !bent_ ? misWeight(pdf_, nextEvent_.pdf(hit)) : 1.0f;
   }
 
  private:
-  Vec3 position_ = Vec3::Zero(), direction_ = Vec3::Zero();
+  LightSelection nextEvent_;
+  Vec3 direction_ = Vec3::Zero();
   float pdf_ = 0;  // 0: next-event estimation does not find the emission
   int surfaces_ = 0;
   bool bent_ = false;

@@ -19,7 +19,7 @@ bool ImportonWalk::advance() {
     escape();
     return false;
   }
-  if (hit->emitter) collect(state_.weight * emittedRadiance(*hit) * emissionWeight_.ofSurface(scene_.lights, *hit));
+  if (hit->emitter) collect(state_.weight * emittedRadiance(*hit) * emissionWeight_.ofSurface(*hit));
   if (!hit->bsdf || !sidesAgree(*hit, hit->woWorld, hit->wo)) return false;
 
   const float delta = hit->bsdf->deltaProbability(hit->wo, hit->uv);
@@ -38,7 +38,7 @@ bool ImportonWalk::goOn(const SurfaceHit& hit, const GuidedSampler::Vertex* vert
   state_.weight *= scattered->weight;
   state_.ray = spawnRay(hit, scattered->direction);
   if (vertex && scattered->pdf > 0) {
-    emissionWeight_.scattered(hit.position, scattered->direction, scattered->pdf);
+    emissionWeight_.scattered(scene_.lights.at(hit), scattered->direction, scattered->pdf);
     remember(hit, *vertex, *scattered);
   } else {
     emissionWeight_.passed(hit, scattered->wi, scene_.shadowSurfaces);
@@ -58,8 +58,7 @@ void ImportonWalk::arrive(const SurfaceHit& hit) {
 // estimation.
 void ImportonWalk::escape() {
   const Vec3& wi = state_.ray.direction;
-  const Rgb light =
-      state_.weight * scene_.lights.environmentRadiance(wi) * emissionWeight_.ofEnvironment(scene_.lights);
+  const Rgb light = state_.weight * scene_.lights.environmentRadiance(wi) * emissionWeight_.ofEnvironment();
   collect(light);
   const float weight = luminance(light);
   if (wishes_.uses && depth_ > 1 && usable(weight)) result_.uses.push_back({state_.ray.origin, wi, weight});
@@ -68,7 +67,7 @@ void ImportonWalk::escape() {
 void ImportonWalk::addDirectLight(const SurfaceHit& hit, const GuidedSampler::Vertex& vertex, float smoothFraction) {
   if (!wishes_.uses && !wishes_.samples && !wishes_.fractions) return;
   const double choice = rng_.uniformDouble();
-  const std::optional<LightSample> light = scene_.lights.sample(hit.position, choice, rng_.uniform2());
+  const std::optional<LightSample> light = scene_.lights.at(hit).sample(choice, rng_.uniform2());
   if (!light) return;
   const Vec3 wi = hit.frame.toLocal(light->wi);
   if (!sidesAgree(hit, light->wi, wi)) return;

@@ -74,15 +74,17 @@ PhotonWalk::Passage PhotonWalk::passageAfter(const Branch& branch, const Surface
 /// sampling does not find.
 float PhotonWalk::directFraction(const EmittedPhoton& photon, const Passage& passage, const SurfaceHit& hit) const {
   if (!passage.specular) return 1;
-  if (std::isinf(photon.emitterDensity)) return 0;
+  if (photon.delta) return 0;
   if (!passage.followed || (passage.bent && !photon.far)) return 1;
-  float emitter = photon.emitterDensity;
-  if (passage.bent) {
-    emitter = scene_.lights.environmentPdf(hit.woWorld);
-  } else if (!photon.far) {
+  const LightSelection nextEvent = scene_.lights.at(hit);
+  float emitter = 0;
+  if (photon.far) {
+    emitter = nextEvent.environmentPdf(hit.woWorld);
+  } else {
     const float distance = passage.distance + hit.distance;
     const float cosineAtLight = std::abs(photon.normal.dot(photon.ray.direction));
-    emitter *= distance * distance / std::max(cosineAtLight, 1e-6f);
+    emitter =
+        nextEvent.probability(photon.light) * photon.areaDensity * distance * distance / std::max(cosineAtLight, 1e-6f);
   }
   const float cosine = std::abs(hit.normal.dot(hit.woWorld));
   return misWeight(std::max(cosine * kInvPi, 1e-6f), emitter);
