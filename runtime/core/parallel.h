@@ -1,9 +1,10 @@
 #pragma once
-// Parallel loops that either complete or throw.
+// Parallel loops and sorting that either complete or throw.
 
 #include <stdexcept>
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 #include <tbb/task_group.h>
 
 namespace lobe {
@@ -23,6 +24,14 @@ void parallelFor(Index begin, Index end, const Body& body) {
   tbb::task_group_context context;  // bound to the enclosing loop, if there is one, and cancelled with it
   tbb::parallel_for(begin, end, body, context);
   if (context.is_group_execution_cancelled()) throw LoopCancelled();
+}
+
+/// Sorts a range with random access by an order in which no two elements are equivalent, so that the result does not
+/// depend on threads. Throws LoopCancelled like parallelFor.
+template <class Range, class Less>
+void parallelSort(Range& range, const Less& less) {
+  tbb::parallel_sort(range.begin(), range.end(), less);
+  if (tbb::is_current_task_group_canceling()) throw LoopCancelled();
 }
 
 }  // namespace lobe

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <bit>
 #include <new>
+#include <numeric>
 
+#include "runtime/core/parallel.h"
 #include "runtime/mixture/packing.h"
 
 namespace lobe {
@@ -61,17 +63,24 @@ void prefetch(const PackedRecord& record) {
 
 IlluminationCache::IlluminationCache(const std::vector<IlluminationRecord>& records, float unit)
     : unit_(unit), inverseCellSize_(kCellsPerUnit / unit) {
-  for (const IlluminationRecord& record : records) pack(record);
+  std::uint32_t block = 0;
+  for (const IlluminationRecord& r : records) {
+    places_.push_back({r.position, r.normal, r.radius, block});
+    block += static_cast<std::uint32_t>((PackedRecord::bytesFor(r.count) + sizeof(Block) - 1) / sizeof(Block));
+  }
+  blocks_.resize(block);
+  parallelFor(std::size_t{0}, records.size(), [&](std::size_t i) { pack(records[i], i); });
   const std::vector<Placement> placements = placeInCells();
   std::vector<Cell> cells;
-  entries_.reserve(placements.size());
-  for (const Placement& p : placements) {
-    const auto next = static_cast<std::uint32_t>(entries_.size());
-    if (cells.empty() || cells.back().key != p.key) cells.push_back({p.key, next, next});
+  for (std::uint32_t i = 0; i < placements.size(); ++i) {
+    if (cells.empty() || cells.back().key != placements[i].key) cells.push_back({placements[i].key, i, i});
     ++cells.back().end;
-    const Place& r = places_[p.record];
-    entries_.push_back({r.position, r.normal, r.radius * r.radius, r.block});
   }
+  entries_.resize(placements.size());
+  parallelFor(std::size_t{0}, placements.size(), [&](std::size_t i) {
+    const Place& r = places_[placements[i].record];
+    entries_[i] = {r.position, r.normal, r.radius * r.radius, r.block};
+  });
   table_.assign(std::bit_ceil(2 * cells.size() + 2), Cell{0, 0, 0});
   for (const Cell& cell : cells) {
     std::size_t slot = slotOf(cell.key, table_.size());
@@ -80,45 +89,54 @@ IlluminationCache::IlluminationCache(const std::vector<IlluminationRecord>& reco
   }
 }
 
+template <class Visit>
+void IlluminationCache::forEachKey(const Place& r, const Visit& visit) const {
+  const Vec3 centre = r.position * inverseCellSize_;  // in cells
+  const float radius = r.radius * inverseCellSize_ + kRounding;
+  const Eigen::Vector3i low = (centre.array() - radius).floor().cast<int>();
+  const Eigen::Vector3i high = (centre.array() + radius).floor().cast<int>();
+  for (int z = low.z(); z <= high.z(); ++z)
+    for (int y = low.y(); y <= high.y(); ++y)
+      for (int x = low.x(); x <= high.x(); ++x) {
+        const Vec3 corner(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z));
+        const Eigen::AlignedBox3f cell(corner, corner + Vec3::Ones());
+        if (cell.squaredExteriorDistance(centre) > radius * radius) continue;
+        for (int side = 0; side < kSides; ++side)
+          if (mayServe(r.normal, static_cast<Side>(side))) visit(cellKey({x, y, z}, static_cast<Side>(side)));
+      }
+}
+
 std::vector<IlluminationCache::Placement> IlluminationCache::placeInCells() const {
-  std::vector<Placement> placements;
-  for (std::uint32_t i = 0; i < places_.size(); ++i) {
-    const Place& r = places_[i];
-    const Vec3 centre = r.position * inverseCellSize_;  // in cells
-    const float radius = r.radius * inverseCellSize_ + kRounding;
-    const Eigen::Vector3i low = (centre.array() - radius).floor().cast<int>();
-    const Eigen::Vector3i high = (centre.array() + radius).floor().cast<int>();
-    for (int z = low.z(); z <= high.z(); ++z)
-      for (int y = low.y(); y <= high.y(); ++y)
-        for (int x = low.x(); x <= high.x(); ++x) {
-          const Vec3 corner(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z));
-          const Eigen::AlignedBox3f cell(corner, corner + Vec3::Ones());
-          if (cell.squaredExteriorDistance(centre) > radius * radius) continue;
-          for (int side = 0; side < kSides; ++side)
-            if (mayServe(r.normal, static_cast<Side>(side)))
-              placements.push_back({cellKey({x, y, z}, static_cast<Side>(side)), i});
-        }
-  }
-  std::ranges::sort(placements, {}, [](const Placement& p) { return std::pair(p.key, p.record); });
+  // The first placement of each record is known only after those of all earlier ones have been counted.
+  std::vector<std::size_t> ends(places_.size());
+  parallelFor(std::size_t{0}, places_.size(), [&](std::size_t i) {
+    std::size_t count = 0;
+    forEachKey(places_[i], [&](std::uint64_t) { ++count; });
+    ends[i] = count;
+  });
+  std::partial_sum(ends.begin(), ends.end(), ends.begin());
+  std::vector<Placement> placements(ends.empty() ? 0 : ends.back());
+  parallelFor(std::size_t{0}, places_.size(), [&](std::size_t i) {
+    std::size_t next = i > 0 ? ends[i - 1] : 0;
+    forEachKey(places_[i], [&](std::uint64_t key) { placements[next++] = {key, static_cast<std::uint32_t>(i)}; });
+  });
+  parallelSort(placements, [](const Placement& a, const Placement& b) {
+    return a.key != b.key ? a.key < b.key : a.record < b.record;
+  });
   return placements;
 }
 
-void IlluminationCache::pack(const IlluminationRecord& record) {
+void IlluminationCache::pack(const IlluminationRecord& record, std::size_t index) {
   static_assert(sizeof(PackedRecord) == sizeof(Block) && kMaxLightComponents == 8);
-  const int stride = PackedRecord::strideFor(record.count);
-  const std::size_t first = blocks_.size();
-  places_.push_back({record.position, record.normal, record.radius, static_cast<std::uint32_t>(first)});
-  constexpr std::size_t kBlockFloats = sizeof(Block) / sizeof(float);
-  const std::size_t floats = static_cast<std::size_t>(stride) * kGaussianFields;
-  blocks_.resize(first + 1 + (floats + kBlockFloats - 1) / kBlockFloats);
+  const std::size_t first = places_[index].block;
   new (&blocks_[first]) PackedRecord{.tangentXyz = {record.tangent.x(), record.tangent.y(), record.tangent.z()},
                                      .background = record.background,
                                      .irradiance = record.irradiance,
                                      .samples = record.samples,
                                      .bsdfFraction = record.bsdfFraction,
                                      .count = static_cast<std::uint32_t>(record.count) & 0xfu,
-                                     .index = static_cast<std::uint32_t>(places_.size() - 1) & 0xfffffffu};
-  packGaussians(record.gaussians(), blocks_[first + 1].floats.data(), stride);
+                                     .index = static_cast<std::uint32_t>(index) & 0xfffffffu};
+  packGaussians(record.gaussians(), blocks_[first + 1].floats.data(), PackedRecord::strideFor(record.count));
 }
 
 IlluminationRecord IlluminationCache::unpacked(const PackedRecord& record) const {

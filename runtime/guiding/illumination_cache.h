@@ -122,9 +122,12 @@ class IlluminationCache {
     std::uint64_t key;  // cell and side
     std::uint32_t record;
   };
-  void pack(const IlluminationRecord& record);
-  /// Places every record into each cell that its radius overlaps, for each side that it may serve. Sorted by key, then
-  /// by record.
+  /// Writes the record to its blocks; its place must be known.
+  void pack(const IlluminationRecord& record, std::size_t index);
+  /// Visits the key of each cell that the record's radius overlaps, for each side that it may serve.
+  template <class Visit>
+  void forEachKey(const Place& record, const Visit& visit) const;
+  /// Places every record into its cells. Sorted by key, then by record.
   std::vector<Placement> placeInCells() const;
   const PackedRecord& at(std::uint32_t block) const { return reinterpret_cast<const PackedRecord&>(blocks_[block]); }
   const Cell* findCell(std::uint64_t key) const;

@@ -193,7 +193,7 @@ void IlluminationTrainer::shrinkRadius(Training& record) const {
 
 void IlluminationTrainer::rebuildCache() {
   std::vector<IlluminationRecord> records(records_.size());
-  for (std::size_t i = 0; i < records_.size(); ++i) {
+  parallelFor(std::size_t{0}, records_.size(), [&](std::size_t i) {
     const Training& t = records_[i];
     IlluminationRecord& r = records[i];
     r.position = t.position;
@@ -206,7 +206,7 @@ void IlluminationTrainer::rebuildCache() {
     r.bsdfFraction = t.fraction.bsdf();
     r.count = static_cast<std::int32_t>(t.em.gaussians().size());
     std::ranges::copy(t.em.gaussians(), r.components.begin());
-  }
+  });
   cache_ = IlluminationCache(records, unit_);
 }
 

@@ -1,31 +1,80 @@
 #include "lobe/sample_storage.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <numeric>
+#include <utility>
 
+#include "runtime/core/parallel.h"
 #include "runtime/guiding/conversions.h"
 #include "runtime/guiding/sample_storage_data.h"
 
 namespace lobe {
 namespace {
 
+using Data = SampleStorageData;
+
 template <class T>
-void appendRange(std::vector<T>& to, const std::vector<T>& from, std::size_t begin, std::size_t end) {
-  to.insert(to.end(), from.begin() + static_cast<std::ptrdiff_t>(begin),
-            from.begin() + static_cast<std::ptrdiff_t>(end));
+using ListOf = std::vector<T> Data::*;
+
+template <class T>
+void appendList(Data& to, std::span<Data* const> others, ListOf<T> list) {
+  std::vector<T>& all = to.*list;
+  if (others.size() > 1) {
+    std::size_t size = all.size();
+    for (const Data* other : others) size += (other->*list).size();
+    all.reserve(size);
+  }
+  for (Data* other : others) {
+    std::vector<T> more = std::move(other->*list);
+    if (all.empty() && others.size() == 1)
+      all = std::move(more);
+    else
+      all.insert(all.end(), more.begin(), more.end());
+  }
+}
+
+void appendPaths(Data& to, std::span<const Data* const> others) {
+  Data::Path first = to.end();
+  for (const Data* other : others) {
+    for (const Data::Path& path : other->paths)
+      to.paths.push_back({path.index, first.photons + path.photons, first.samples + path.samples,
+                          first.fractions + path.fractions, first.requests + path.requests});
+    const Data::Path size = other->end();
+    first = {0, first.photons + size.photons, first.samples + size.samples, first.fractions + size.fractions,
+             first.requests + size.requests};
+  }
+}
+
+/// Copies the elements of one list, path by path in the given order.
+template <class T>
+void gather(const Data& from, std::span<const std::size_t> order, ListOf<T> list, std::size_t Data::Path::*first,
+            Data& to) {
+  const std::vector<T>& all = from.*list;
+  const auto at = [&](std::size_t path) {
+    return all.begin() + static_cast<std::ptrdiff_t>(path < from.paths.size() ? from.paths[path].*first : all.size());
+  };
+  (to.*list).reserve(all.size());
+  for (const std::size_t i : order) (to.*list).insert((to.*list).end(), at(i), at(i + 1));
+}
+
+/// Calls f(list, member of Path) for each of the lists in parallel.
+template <class Function>
+void forEachList(const Function& f) {
+  const std::array<std::function<void()>, 4> calls{
+      [&] { f(&Data::photons, &Data::Path::photons); }, [&] { f(&Data::samples, &Data::Path::samples); },
+      [&] { f(&Data::fractions, &Data::Path::fractions); }, [&] { f(&Data::requests, &Data::Path::requests); }};
+  parallelFor(std::size_t{0}, calls.size(), [&](std::size_t i) { calls[i](); });
 }
 
 }  // namespace
 
-void SampleStorageData::append(const SampleStorageData& other) {
-  for (const Path& path : other.paths)
-    paths.push_back({path.index, photons.size() + path.photons, samples.size() + path.samples,
-                     fractions.size() + path.fractions, requests.size() + path.requests});
-  photons.insert(photons.end(), other.photons.begin(), other.photons.end());
-  samples.insert(samples.end(), other.samples.begin(), other.samples.end());
-  fractions.insert(fractions.end(), other.fractions.begin(), other.fractions.end());
-  requests.insert(requests.end(), other.requests.begin(), other.requests.end());
+void SampleStorageData::append(std::span<SampleStorageData* const> others) {
+  appendPaths(*this, others);
+  forEachList([&](auto list, auto) { appendList(*this, others, list); });
+  for (SampleStorageData* other : others) other->paths.clear();
 }
 
 bool SampleStorageData::isInOrder() const {
@@ -36,16 +85,16 @@ SampleStorageData SampleStorageData::inOrder() const {
   std::vector<std::size_t> order(paths.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::stable_sort(order, {}, [this](std::size_t i) { return paths[i].index; });
-  const Path end{0, photons.size(), samples.size(), fractions.size(), requests.size()};
   SampleStorageData sorted;
+  forEachList([&](auto list, auto first) { gather(*this, order, list, first, sorted); });
+  Path at{};
   for (const std::size_t i : order) {
     const Path& path = paths[i];
-    const Path& next = i + 1 < paths.size() ? paths[i + 1] : end;
-    sorted.beginPath(path.index);
-    appendRange(sorted.photons, photons, path.photons, next.photons);
-    appendRange(sorted.samples, samples, path.samples, next.samples);
-    appendRange(sorted.fractions, fractions, path.fractions, next.fractions);
-    appendRange(sorted.requests, requests, path.requests, next.requests);
+    const Path next = i + 1 < paths.size() ? paths[i + 1] : end();
+    at.index = path.index;
+    sorted.paths.push_back(at);
+    at = {0, at.photons + next.photons - path.photons, at.samples + next.samples - path.samples,
+          at.fractions + next.fractions - path.fractions, at.requests + next.requests - path.requests};
   }
   return sorted;
 }
@@ -72,11 +121,13 @@ void SampleStorage::requestRecord(const Float3& position, const Float3& normal) 
 }
 
 void SampleStorage::merge(SampleStorage&& other) {
-  if (data_->paths.empty())
-    std::swap(data_, other.data_);
-  else
-    data_->append(*other.data_);
-  other.clear();
+  merge(std::span(&other, 1));
+}
+
+void SampleStorage::merge(std::span<SampleStorage> others) {
+  std::vector<SampleStorageData*> data;
+  for (SampleStorage& other : others) data.push_back(other.data_.get());
+  data_->append(data);
 }
 
 std::size_t SampleStorage::particles() const {

@@ -2,6 +2,7 @@
 // The content of a SampleStorage.
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "lobe/sample_storage.h"
@@ -24,9 +25,13 @@ struct SampleStorageData {
   std::vector<Path> paths;
 
   void beginPath(std::uint64_t index) {
-    paths.push_back({index, photons.size(), samples.size(), fractions.size(), requests.size()});
+    paths.push_back(end());
+    paths.back().index = index;
   }
-  void append(const SampleStorageData& other);
+  /// Where a path that is begun next starts.
+  Path end() const { return {0, photons.size(), samples.size(), fractions.size(), requests.size()}; }
+  /// Appends the content of the others in their order, in parallel, and leaves them empty.
+  void append(std::span<SampleStorageData* const> others);
   /// A copy with the paths sorted by index.
   SampleStorageData inOrder() const;
   bool isInOrder() const;

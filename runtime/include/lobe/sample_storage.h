@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 
 #include "lobe/types.h"
 
@@ -43,6 +44,8 @@ class SampleStorage {
 
   /// Appends the content of another storage and leaves that one empty.
   void merge(SampleStorage&& other);
+  /// Appends the contents of other storages in their order, in parallel, and leaves those empty.
+  void merge(std::span<SampleStorage> others);
 
   /// Number of particles, from photons and camera paths.
   std::size_t particles() const;

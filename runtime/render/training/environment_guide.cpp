@@ -40,17 +40,26 @@ void EnvironmentGuide::learn(const Vec3& point, const Vec3& wi, float weight) {
 }
 
 void EnvironmentGuide::update() {
-  bins_ = DiscreteDistribution(weights_);
+  // Importons reach few of the two million bins.
+  bins_.clear();
+  std::vector<double> weights;
+  for (std::size_t i = 0; i < weights_.size(); ++i) {
+    if (!(weights_[i] > 0)) continue;
+    bins_.push_back(static_cast<std::uint32_t>(i));
+    weights.push_back(weights_[i]);
+  }
+  choice_ = DiscreteDistribution(weights);
 }
 
 std::optional<EmittedPhoton> EnvironmentGuide::sample(double choice, const Vec2& u1, const Vec2& u2) const {
-  if (!(bins_.total() > 0)) {
+  if (bins_.empty()) {
     const std::optional<EnvironmentSample> from = environment_.sample(u1);
     if (!from) return std::nullopt;
     return lights_.photonFromEnvironment(*from, u2);
   }
-  const std::size_t bin = bins_.sample(choice);
-  const int index = static_cast<int>(bin) / (kCells * kCells), cell = static_cast<int>(bin) % (kCells * kCells);
+  const std::size_t chosen = choice_.sample(choice);
+  const auto bin = static_cast<int>(bins_[chosen]);
+  const int index = bin / (kCells * kCells), cell = bin % (kCells * kCells);
   const PixelBlock pixels = block(index);
   if (environment_.blockWeight(pixels) <= 0) return std::nullopt;
   const std::optional<EnvironmentSample> from = environment_.sample(pixels, u1);
@@ -60,7 +69,7 @@ std::optional<EmittedPhoton> EnvironmentGuide::sample(double choice, const Vec2&
   const int row = cell / kCells;
   const Vec2 corner(static_cast<float>(cell % kCells), static_cast<float>(row));
   const Vec2 u = ((corner + u2) / kCells).cwiseMin(kOneMinusEpsilon);
-  const float pdf = bins_.probability(bin) * kCells * kCells * from->pdf;
+  const float pdf = choice_.probability(chosen) * kCells * kCells * from->pdf;
   if (!(pdf > 0)) return std::nullopt;
   return lights_.photonFromEnvironment({from->wi, from->radiance, pdf}, u);
 }

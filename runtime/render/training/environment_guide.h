@@ -39,8 +39,9 @@ class EnvironmentGuide {
 
   const Lights& lights_;
   const EnvironmentLight& environment_;
-  std::vector<float> weights_;  // by block, then cell
-  DiscreteDistribution bins_;
+  std::vector<float> weights_;       // by block, then cell
+  std::vector<std::uint32_t> bins_;  // indices of the positive weights
+  DiscreteDistribution choice_;      // over bins_
 };
 
 }  // namespace lobe

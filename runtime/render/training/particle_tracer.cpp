@@ -8,7 +8,7 @@ namespace {
 // Keeps the random numbers of training apart from those of rendering with the same seed.
 constexpr std::uint64_t kTrainingSeed = 0x747261696e696e67;
 
-constexpr int kChunk = 1024;
+constexpr int kChunk = 256;
 // Path numbers of photons follow those of importons.
 constexpr std::uint64_t kFirstPhoton = std::uint64_t{1} << 32;
 
@@ -24,6 +24,16 @@ std::vector<Result> traceChunks(std::uint64_t seed, std::uint64_t stream, int co
     }
   });
   return results;
+}
+
+/// The content of one storage of all results, in their order.
+template <class Result>
+SampleStorage merged(std::vector<Result>& results, SampleStorage Result::*storage) {
+  std::vector<SampleStorage> parts;
+  for (Result& result : results) parts.push_back(std::move(result.*storage));
+  SampleStorage all;
+  all.merge(parts);
+  return all;
 }
 
 }  // namespace
@@ -46,29 +56,20 @@ ImportonResult ParticleTracer::traceImportons(int pass, int count, const Importo
         const Ray ray = camera_.sample(x, y, rng);
         ImportonWalk(scene_, radiance_, wishes, rng, result).run(ray, static_cast<std::uint64_t>(i));
       });
-  ImportonResult all;
-  for (ImportonResult& result : results) {
-    all.radiance.merge(std::move(result.radiance));
-    all.importance.merge(std::move(result.importance));
-    all.uses.insert(all.uses.end(), result.uses.begin(), result.uses.end());
-  }
+  ImportonResult all{merged(results, &ImportonResult::radiance), merged(results, &ImportonResult::importance), {}};
+  for (const ImportonResult& result : results) all.uses.insert(all.uses.end(), result.uses.begin(), result.uses.end());
   return all;
 }
 
 PhotonResult ParticleTracer::tracePhotons(int pass, int count) const {
-  PhotonResult all;
-  if (scene_.lights.empty()) return all;
+  if (scene_.lights.empty()) return {};
   auto results = traceChunks<PhotonResult>(seed_, 2 * static_cast<std::uint64_t>(pass) + 1, count,
                                            [&](int i, Sampler& rng, PhotonResult& result) {
                                              if (const std::optional<EmittedPhoton> photon = emit(rng))
                                                PhotonWalk(scene_, importance_, rng, result)
                                                    .run(*photon, kFirstPhoton + static_cast<std::uint64_t>(i), count);
                                            });
-  for (PhotonResult& result : results) {
-    all.radiance.merge(std::move(result.radiance));
-    all.importance.merge(std::move(result.importance));
-  }
-  return all;
+  return {merged(results, &PhotonResult::radiance), merged(results, &PhotonResult::importance)};
 }
 
 std::optional<EmittedPhoton> ParticleTracer::emit(Sampler& rng) const {
