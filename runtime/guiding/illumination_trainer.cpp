@@ -2,22 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <stdexcept>
 #include <string>
-#include <unordered_map>
 
 #include "runtime/core/parallel.h"
+#include "runtime/guiding/request_cubes.h"
 
 namespace lobe {
 namespace {
 
 constexpr float kNeighbourNormalCosine = 0.707f;
 constexpr int kUndersampledPerComponent = 5;
-// Smallest distance, in units, of records that are created in the same round. Records that are closer may serve each
-// other's request, and a fit that is discarded wastes time: in the kitchen scene, four of five fits at a distance of
-// 0.3 and one of twenty at 1.
-constexpr float kRoundSpacing = 1.0f;
 // Radius, in units, within which further requests are dropped after a request that found no particle.
 constexpr float kEmptySpacing = 0.3f;
 
@@ -25,54 +22,15 @@ void require(bool condition, const char* field, const char* rule) {
   if (!condition) throw std::runtime_error(std::string("training option ") + field + " must be " + rule);
 }
 
-/// A hash grid of points with normals, for queries of the points near a position.
-template <class Value>
-class PointGrid {
- public:
-  explicit PointGrid(float cellSize) : cellSize_(cellSize) {}
+/// A point where a record was created, or where none could be.
+struct Placed {
+  Vec3 position, normal;
+  float radius;  // within which requests of similar normals are dropped
 
-  void add(const Vec3& x, const Vec3& n, const Value& value) { cells_[key(cell(x))].push_back({x, n, value}); }
-
-  /// Whether f(distance², value) is true for a point with a normal within 45° of n. Finds all points that are closer
-  /// than the size of a cell.
-  template <class Predicate>
-  bool any(const Vec3& x, const Vec3& n, const Predicate& f) const {
-    const Eigen::Vector3i centre = cell(x);
-    for (int i = 0; i < 27; ++i) {
-      const auto found = cells_.find(key(centre + Eigen::Vector3i(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1)));
-      if (found == cells_.end()) continue;
-      for (const Entry& e : found->second)
-        if (e.n.dot(n) >= kNeighbourNormalCosine && f((e.x - x).squaredNorm(), e.value)) return true;
-    }
-    return false;
+  bool serves(const RecordRequest& r) const {
+    return normal.dot(r.normal) >= kNeighbourNormalCosine && (position - r.position).squaredNorm() <= radius * radius;
   }
-
- private:
-  struct Entry {
-    Vec3 x, n;
-    Value value;
-  };
-  Eigen::Vector3i cell(const Vec3& x) const { return (x / cellSize_).array().floor().cast<int>(); }
-  static std::uint64_t key(const Eigen::Vector3i& c) {
-    return static_cast<std::uint32_t>(c.x()) * 73856093ull ^ static_cast<std::uint32_t>(c.y()) * 19349663ull << 16 ^
-           static_cast<std::uint32_t>(c.z()) * 83492791ull << 32;
-  }
-  float cellSize_;
-  std::unordered_map<std::uint64_t, std::vector<Entry>> cells_;
 };
-
-/// Moves requests out of `waiting`, in order, such that they are farther from one another than the distance.
-std::vector<RecordRequest> takeApart(std::vector<RecordRequest>& waiting, float distance) {
-  PointGrid<char> grid(distance);
-  std::vector<RecordRequest> taken, left;
-  for (const RecordRequest& r : waiting) {
-    const bool close = grid.any(r.position, r.normal, [&](float d2, char) { return d2 <= distance * distance; });
-    (close ? left : taken).push_back(r);
-    if (!close) grid.add(r.position, r.normal, 0);
-  }
-  waiting = std::move(left);
-  return taken;
-}
 
 }  // namespace
 
@@ -131,29 +89,32 @@ std::optional<double> IlluminationTrainer::updateAll(const ParticleNeighbours& n
   return sum / static_cast<double>(count);
 }
 
-// Processes the requests in their order, but in parallel rounds of requests that are far enough from one another. A new
-// record whose request is already served by an earlier record is discarded, so that the result is the same as when the
-// requests are processed one at a time.
+// Processes the requests of each cube in their order. The edge of a cube is the largest radius, so that records do not
+// serve requests in other cubes of the same parity, and these can be processed in parallel.
 void IlluminationTrainer::makeRecords(const ParticleNeighbours& neighbours, std::span<const RecordRequest> requests) {
-  PointGrid<float> placed(unit_);  // values: radii
-  const auto isServed = [&](const RecordRequest& r) {
-    return placed.any(r.position, r.normal, [](float d2, float radius) { return d2 <= radius * radius; });
-  };
-  std::vector<RecordRequest> waiting;
-  for (const RecordRequest& request : requests)
-    if (!cache_.find(request.position, request.normal)) waiting.push_back(request);
-  while (!waiting.empty()) {
-    std::erase_if(waiting, isServed);
-    const std::vector<RecordRequest> round = takeApart(waiting, kRoundSpacing * unit_);
-    std::vector<std::optional<Training>> made(round.size());
-    parallelFor(std::size_t{0}, round.size(), [&](std::size_t i) { made[i] = makeRecord(neighbours, round[i]); });
-    for (std::size_t i = 0; i < round.size(); ++i) {
-      if (isServed(round[i])) continue;
+  const RequestCubes cubes(requests, unit_,
+                           [this](const RecordRequest& r) { return !cache_.find(r.position, r.normal); });
+  std::vector<std::vector<Placed>> placed(cubes.size());
+  std::vector<std::vector<Training>> made(cubes.size());
+  const auto process = [&](std::size_t cube) {
+    std::vector<Placed> near;
+    for (const std::size_t other : cubes.around(cube))
+      near.insert(near.end(), placed[other].begin(), placed[other].end());
+    for (const std::uint32_t i : cubes.requests(cube)) {
+      const RecordRequest& request = requests[i];
+      if (std::ranges::any_of(near, [&](const Placed& p) { return p.serves(request); })) continue;
+      std::optional<Training> record = makeRecord(neighbours, request);
       // If there is no particle, requests nearby are unlikely to find any.
-      placed.add(round[i].position, round[i].normal, made[i] ? made[i]->radius : kEmptySpacing * unit_);
-      if (made[i]) records_.push_back(std::move(*made[i]));
+      near.push_back({request.position, request.normal, record ? record->radius : kEmptySpacing * unit_});
+      placed[cube].push_back(near.back());
+      if (record) made[cube].push_back(std::move(*record));
     }
+  };
+  for (int parity = 0; parity < RequestCubes::kParities; ++parity) {
+    const std::vector<std::size_t> apart = cubes.ofParity(parity);
+    parallelFor(std::size_t{0}, apart.size(), [&](std::size_t i) { process(apart[i]); });
   }
+  for (std::vector<Training>& records : made) std::ranges::move(records, std::back_inserter(records_));
   rebuildCache();
 }
 

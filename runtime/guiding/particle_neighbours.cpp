@@ -6,39 +6,20 @@
 #include <numbers>
 
 #include <Eigen/Geometry>
-#include <nanoflann.hpp>
 
 #include "runtime/core/parallel.h"
+#include "runtime/guiding/particle_tree.h"
 
 namespace lobe {
 namespace {
 
 constexpr float kNeighbourNormalCosine = 0.707f;
 
-struct ParticlePositions {
-  std::span<const Particle> particles;
-  // The interface of a data set in nanoflann, with nanoflann's names.
-  // NOLINTBEGIN(readability-identifier-naming)
-  std::size_t kdtree_get_point_count() const { return particles.size(); }
-  float kdtree_get_pt(std::size_t i, std::size_t axis) const {
-    return particles[i].position[static_cast<Eigen::Index>(axis)];
-  }
-  template <class Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-  // NOLINTEND(readability-identifier-naming)
-};
-
-using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, ParticlePositions>,
-                                                   ParticlePositions, 3, std::uint32_t>;
-
 /// The nearest `count` particles on the side of a normal, unordered. Particles of other sides are rejected during the
-/// search, because those behind a thin wall could otherwise fill the set. nanoflann's own result set is kept sorted,
-/// which costs more than the search; this one collects twice the count and then drops the farther half.
+/// search, because those behind a thin wall could otherwise fill the set. Twice the count is collected before the
+/// farther half is dropped, which costs less than keeping the set sorted.
 class NearestSet {
  public:
-  using DistanceType = float;
   struct Neighbour {
     float distance2;
     std::uint32_t index;
@@ -54,19 +35,13 @@ class NearestSet {
     return neighbours_;
   }
 
-  // The interface of a result set in nanoflann, with nanoflann's names.
-  // NOLINTBEGIN(readability-identifier-naming)
-  bool full() const { return true; }  // the bound holds from the start
-  float worstDist() const { return worst_; }
-  bool addPoint(float distance2, std::uint32_t index) {
-    if (distance2 >= worst_) return true;
+  float reach2() const { return worst_; }
+  void add(float distance2, std::uint32_t index) {
     const Particle& p = particles_[index];
-    if (p.normal.dot(n_) < kNeighbourNormalCosine || p.direction.dot(n_) <= 0) return true;
+    if (p.normal.dot(n_) < kNeighbourNormalCosine || p.direction.dot(n_) <= 0) return;
     neighbours_.push_back({distance2, index});
     if (neighbours_.size() == 2 * count_) drop();
-    return true;
   }
-  // NOLINTEND(readability-identifier-naming)
 
  private:
   void drop() {
@@ -98,15 +73,15 @@ struct Tally {
 class ParticleNeighbours::Tree {
  public:
   Tree(std::span<const Particle> particles, int count, float maxDistance)
-      : positions_{particles}, count_(count), maxDistance2_(maxDistance * maxDistance), tree_(3, positions_, {16}) {}
+      : count_(count), maxDistance2_(maxDistance * maxDistance), tree_(particles) {}
 
   Tally collect(const Vec3& x, const Vec3& n, const Vec3& tangent, std::vector<WeightedPoint>& points) const {
-    NearestSet nearest(positions_.particles, n, count_, maxDistance2_);
-    tree_.findNeighbors(nearest, x.data(), nanoflann::SearchParams());
+    NearestSet nearest(tree_.particles(), n, count_, maxDistance2_);
+    tree_.search(x, nearest);
     const Vec3 bitangent = n.cross(tangent);
     Tally tally;
     for (const NearestSet::Neighbour& neighbour : nearest.finish()) {
-      const Particle& p = positions_.particles[neighbour.index];
+      const Particle& p = tree_.particles()[neighbour.index];
       const Vec3 local(p.direction.dot(tangent), p.direction.dot(bitangent), p.direction.dot(n));
       points.push_back({toDisc(local), p.weight});
       tally.radius2 = std::max(tally.radius2, neighbour.distance2);
@@ -119,10 +94,9 @@ class ParticleNeighbours::Tree {
   }
 
  private:
-  ParticlePositions positions_;
   std::size_t count_;
   float maxDistance2_;
-  KdTree tree_;
+  ParticleTree tree_;
 };
 
 ParticleNeighbours::ParticleNeighbours(std::span<const std::span<const Particle>> sources, int count,

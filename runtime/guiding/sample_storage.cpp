@@ -36,16 +36,30 @@ void appendList(Data& to, std::span<Data* const> others, ListOf<T> list) {
   }
 }
 
-void appendPaths(Data& to, std::span<const Data* const> others) {
-  Data::Path first = to.end();
+/// The lists of a part that is appended: where its paths go, and the sizes of the lists before.
+struct Part {
+  std::size_t paths;
+  Data::Path before;
+};
+
+Data::Path sum(const Data::Path& a, const Data::Path& b) {
+  return {b.index, a.photons + b.photons, a.samples + b.samples, a.fractions + b.fractions, a.requests + b.requests};
+}
+
+/// Must be called before the other lists are appended.
+void appendPaths(Data& to, std::span<Data* const> others) {
+  std::vector<Part> parts;
+  Part next{to.paths.size(), to.end()};
   for (const Data* other : others) {
-    for (const Data::Path& path : other->paths)
-      to.paths.push_back({path.index, first.photons + path.photons, first.samples + path.samples,
-                          first.fractions + path.fractions, first.requests + path.requests});
-    const Data::Path size = other->end();
-    first = {0, first.photons + size.photons, first.samples + size.samples, first.fractions + size.fractions,
-             first.requests + size.requests};
+    parts.push_back(next);
+    next = {next.paths + other->paths.size(), sum(next.before, other->end())};
   }
+  to.paths.resize(next.paths);
+  parallelFor(std::size_t{0}, others.size(), [&](std::size_t i) {
+    const auto out = to.paths.begin() + static_cast<std::ptrdiff_t>(parts[i].paths);
+    std::ranges::transform(others[i]->paths, out, [&](const Data::Path& path) { return sum(parts[i].before, path); });
+    others[i]->paths = {};
+  });
 }
 
 /// Copies the elements of one list, path by path in the given order.
@@ -71,10 +85,21 @@ void forEachList(const Function& f) {
 
 }  // namespace
 
+void SampleStorageData::beginPath(std::uint64_t index) {
+  Path path = end();
+  path.index = index;
+  const bool lastIsEmpty = !paths.empty() && photons.size() == paths.back().photons &&
+                           samples.size() == paths.back().samples && fractions.size() == paths.back().fractions &&
+                           requests.size() == paths.back().requests;
+  if (lastIsEmpty)
+    paths.back() = path;
+  else
+    paths.push_back(path);
+}
+
 void SampleStorageData::append(std::span<SampleStorageData* const> others) {
   appendPaths(*this, others);
   forEachList([&](auto list, auto) { appendList(*this, others, list); });
-  for (SampleStorageData* other : others) other->paths.clear();
 }
 
 bool SampleStorageData::isInOrder() const {

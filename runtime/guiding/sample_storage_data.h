@@ -17,17 +17,15 @@ struct SampleStorageData {
   std::vector<FractionSample> fractions;  ///< from camera paths, for the BSDF sampling fraction
   std::vector<RecordRequest> requests;
 
-  /// The index of the first sample of a path in each of the lists; a path ends where the next one begins.
+  /// The index of the first sample of a path in each of the lists; a path ends where the next one begins. Paths without
+  /// samples need no entry.
   struct Path {
     std::uint64_t index;
     std::size_t photons, samples, fractions, requests;
   };
   std::vector<Path> paths;
 
-  void beginPath(std::uint64_t index) {
-    paths.push_back(end());
-    paths.back().index = index;
-  }
+  void beginPath(std::uint64_t index);
   /// Where a path that is begun next starts.
   Path end() const { return {0, photons.size(), samples.size(), fractions.size(), requests.size()}; }
   /// Appends the content of the others in their order, in parallel, and leaves them empty.

@@ -156,11 +156,12 @@ struct Guiding {
   TrainedIllumination training;
   std::optional<GuidedSampler> sampler;
   std::optional<SampleCountModel> counts;
+  double secondsLights = 0;  ///< time for learning the choice of lights
   double secondsCounts = 0;  ///< time for learning the counts
   std::optional<Pilot> pilot;
 
   /// Time spent before rendering.
-  double seconds() const { return training.report.seconds + secondsCounts + (pilot ? pilot->seconds : 0); }
+  double seconds() const { return secondsLights + training.report.seconds + secondsCounts + (pilot ? pilot->seconds : 0); }
   const LobeCacheSet* cachesOrNull() const { return caches ? &*caches : nullptr; }
   std::size_t unreducedBytes = 0;  ///< size of the records before merging
 
@@ -175,17 +176,12 @@ struct RunResult {
   RenderResult render;
   const Guiding& guiding;
   std::uint64_t dropped;
-  double learningLights;  ///< time of learnLightCells in seconds
 
   const TrainingReport& training() const { return guiding.training.report; }
-<<<<<<< HEAD
   IntegratorKind integrator(const RenderJob& job) const {
     return guiding.pilot ? guiding.pilot->best() : job.integrator;
   }
   double seconds() const { return guiding.seconds() + render.total.seconds; }
-=======
-  double seconds() const { return learningLights + training().seconds + render.total.seconds; }
->>>>>>> 913517d (Choose lights by place: a light tree, tiles of the environment, learnt cells)
 };
 
 /// Times of the steps before training, in seconds.
@@ -235,7 +231,7 @@ nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, c
           {"seconds_embree_build", load.embree},
           {"seconds_restoring_illumination", load.restoring},
           {"seconds_total", run.seconds()},
-          {"seconds_learning_lights", run.learningLights},
+          {"seconds_learning_lights", run.guiding.secondsLights},
           {"seconds_training", run.training().seconds},
           {"seconds_sample_counts", run.guiding.secondsCounts},
           {"seconds_rendering", total.seconds},
@@ -457,7 +453,7 @@ void run(const RenderJob& job) {
   const RayCamera camera(scene.camera, scene.filter);
   const Stopwatch learning;
   renderScene.lights.use(learnLightCells(renderScene, camera, job.seed));
-  const double learnt = learning.seconds();
+  guiding.secondsLights = learning.seconds();
   const std::optional<Receiver> receiver = receiverFor(job, renderScene, camera);
   if (job.integrator != IntegratorKind::path) {
     if (!stored) train(job, renderScene, camera, guiding);
@@ -468,14 +464,8 @@ void run(const RenderJob& job) {
 
   const std::unique_ptr<Integrator> integrator = makeIntegrator(job, renderScene, camera, guiding);
   Film film(camera.width(), camera.height());
-<<<<<<< HEAD
   const RenderResult rendered = renderWithProgress(job, camera, *integrator, guiding.seconds(), film, log);
   const RunResult result{rendered, guiding, film.dropped()};
-=======
-  const RenderResult rendered =
-      renderWithProgress(job, camera, *integrator, learnt + guiding.training.report.seconds, film, log);
-  const RunResult result{rendered, guiding, film.dropped(), learnt};
->>>>>>> 913517d (Choose lights by place: a light tree, tiles of the environment, learnt cells)
   if (result.dropped > 0)
     printWarning(kTool, fmt::format("{} samples were negative or not finite, and were discarded", result.dropped));
   const std::uint64_t hash = pictureHash(scene);

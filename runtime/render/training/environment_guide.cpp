@@ -30,35 +30,33 @@ void EnvironmentGuide::learn(const Vec3& point, const Vec3& wi, float weight) {
   // Few importons leave the scene, so each also contributes to the neighbouring cells. Otherwise the first photons of
   // cells that few importons have reached would outweigh all others.
   const Vec2 u = lights_.photonCoordinates(point, wi);
-  float* const cells = &weights_[static_cast<std::size_t>(blockOf(wi)) * kCells * kCells];
+  const int first = blockOf(wi) * kCells * kCells;
   for (int dy = -1; dy <= 1; ++dy)
     for (int dx = -1; dx <= 1; ++dx) {
       const int x = std::clamp(static_cast<int>(u.x() * kCells) + dx, 0, kCells - 1);
       const int y = (static_cast<int>(u.y() * kCells) + dy + kCells) % kCells;  // the azimuth wraps around
-      cells[y * kCells + x] += weight / static_cast<float>((1 + std::abs(dx)) * (1 + std::abs(dy)) * 4);
+      const int bin = first + y * kCells + x;
+      float& total = weights_[static_cast<std::size_t>(bin)];
+      if (total == 0) bins_.push_back(bin);
+      total += weight / static_cast<float>((1 + std::abs(dx)) * (1 + std::abs(dy)) * 4);
     }
 }
 
 void EnvironmentGuide::update() {
-  // Importons reach few of the two million bins.
-  bins_.clear();
   std::vector<double> weights;
-  for (std::size_t i = 0; i < weights_.size(); ++i) {
-    if (!(weights_[i] > 0)) continue;
-    bins_.push_back(static_cast<std::uint32_t>(i));
-    weights.push_back(weights_[i]);
-  }
+  weights.reserve(bins_.size());
+  for (const int bin : bins_) weights.push_back(weights_[static_cast<std::size_t>(bin)]);
   choice_ = DiscreteDistribution(weights);
 }
 
 std::optional<EmittedPhoton> EnvironmentGuide::sample(double choice, const Vec2& u1, const Vec2& u2) const {
-  if (bins_.empty()) {
+  if (!(choice_.total() > 0)) {
     const std::optional<EnvironmentSample> from = environment_.sample(u1);
     if (!from) return std::nullopt;
     return lights_.photonFromEnvironment(*from, u2);
   }
   const std::size_t chosen = choice_.sample(choice);
-  const auto bin = static_cast<int>(bins_[chosen]);
+  const int bin = bins_[chosen];
   const int index = bin / (kCells * kCells), cell = bin % (kCells * kCells);
   const PixelBlock pixels = block(index);
   if (environment_.blockWeight(pixels) <= 0) return std::nullopt;

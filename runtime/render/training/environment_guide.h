@@ -40,7 +40,7 @@ class EnvironmentGuide {
   const Lights& lights_;
   const EnvironmentLight& environment_;
   std::vector<float> weights_;       // by block, then cell
-  std::vector<std::uint32_t> bins_;  // indices of the positive weights
+  std::vector<int> bins_;  // the positive weights, in the order in which they were reached
   DiscreteDistribution choice_;      // over bins_
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include <oneapi/tbb/parallel_invoke.h>
 
@@ -84,13 +85,13 @@ class Training {
     }
     PhotonResult photons;
     if (wishes_.importance) photons = tracer_->tracePhotons(pass, fractionOf(plan_.photons, size));
-    samples_ = std::move(importons.radiance);
+    SampleStorage before = std::exchange(samples_, std::move(importons.radiance));
     samples_.merge(std::move(photons.radiance));
     importons.importance.merge(std::move(photons.importance));
     PassReport report{0, samples_.particles(), 0, std::nullopt};
-    // The updates run in parallel, because each has sequential parts that leave threads idle.
+    // The updates run in parallel, because each has parts that leave threads idle. Releasing memory takes time too.
     oneapi::tbb::parallel_invoke([&] { importance_.update(importons.importance); },
-                                 [&] { report.logLikelihood = radiance_.update(samples_); });
+                                 [&] { report.logLikelihood = radiance_.update(samples_); }, [&] { before.clear(); });
     report.records = radiance_.records();
     report.seconds = watch.seconds();
     return report;
