@@ -17,6 +17,7 @@ TrainingOptions trainingOptions(const FieldOptions& options) {
   TrainingOptions training;
   training.components = options.components;
   training.neighbours = options.neighbours;
+  training.reservoir = options.reservoir;
   training.unitFraction = options.unitFraction;
   training.klThreshold = options.klThreshold;
   return training;
@@ -75,6 +76,10 @@ std::optional<double> Field::update(const SampleStorage& storage) {
     return trainer.learn(std::array{std::span<const Particle>(data.photons), std::span<const Particle>(data.samples)},
                          data.requests);
   });
+}
+
+void Field::refit() {
+  trainerOf(*data_).refit();
 }
 
 void Field::fill(const SampleStorage& requests, const SampleStorage& particles) {

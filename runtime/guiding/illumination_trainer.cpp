@@ -1,6 +1,7 @@
 #include "runtime/guiding/illumination_trainer.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <iterator>
 #include <limits>
@@ -37,6 +38,7 @@ struct Placed {
 void TrainingOptions::validate() const {
   require(components >= 1 && components <= kMaxIlluminationComponents / 2, "components", "from 1 to 8");
   require(neighbours >= 1, "neighbours", "at least 1");
+  require(reservoir >= 0, "reservoir", "at least 0");
   require(unitFraction > 0 && unitFraction <= 1, "unitFraction", "in (0, 1]");
   require(klThreshold > 0, "klThreshold", "positive");
 }
@@ -77,6 +79,7 @@ std::optional<double> IlluminationTrainer::updateAll(const ParticleNeighbours& n
     if (found.points.empty()) return;
     likelihoods[i] = meanLogLikelihood(found.points, record.em.gaussians(), record.em.background());
     record.em.update(found.points);
+    record.reservoir.add(found.points);
     ++record.passes;
     record.irradiance += (found.irradiance - record.irradiance) / static_cast<float>(record.passes);
     shrinkRadius(record);
@@ -131,10 +134,27 @@ std::optional<IlluminationTrainer::Training> IlluminationTrainer::makeRecord(con
                   found.irradiance,
                   1,
                   StepwiseEm(options_.components),
-                  {}};
+                  {},
+                  reservoirAt(request.position)};
   record.em.fit(found.points);
+  record.reservoir.add(found.points);
   shrinkRadius(record);
   return record;
+}
+
+// The random numbers follow from the position, so that they do not depend on threads.
+PointReservoir IlluminationTrainer::reservoirAt(const Vec3& x) const {
+  const auto bits = [&](int axis) { return std::bit_cast<std::uint32_t>(x[axis]); };
+  return {static_cast<std::size_t>(options_.reservoir), bits(0), bits(1), bits(2)};
+}
+
+void IlluminationTrainer::refit() {
+  if (options_.reservoir == 0) return;
+  parallelFor(std::size_t{0}, records_.size(), [&](std::size_t i) {
+    records_[i].em.refit(records_[i].reservoir.points());
+    shrinkRadius(records_[i]);
+  });
+  rebuildCache();
 }
 
 void IlluminationTrainer::shrinkRadius(Training& record) const {

@@ -9,6 +9,7 @@
 #include "runtime/guiding/bsdf_sampling_fraction.h"
 #include "runtime/guiding/illumination_cache.h"
 #include "runtime/guiding/particle_neighbours.h"
+#include "runtime/guiding/point_reservoir.h"
 #include "runtime/mixture/em.h"
 
 namespace lobe {
@@ -17,6 +18,7 @@ struct TrainingOptions {
   int components = 8;          ///< Gaussians per record, 1 to 8
   int neighbours = 250;        ///< largest number of particles of each source per record and pass, ≥ 1
   float unitFraction = 0.02f;  ///< the largest radius ("unit"), as a fraction of the scene's diagonal, in (0, 1]
+  int reservoir = 500;         ///< largest number of points that each record keeps for refit, ≥ 0
   float klThreshold = 5.0f;    ///< κ: largest parallax within a record's radius, in standard deviations, > 0
 
   /// Throws std::runtime_error that names the first field that is out of range.
@@ -41,6 +43,9 @@ class IlluminationTrainer {
   /// Creates records for requests that no record serves, without updating the existing ones.
   void fill(std::span<const std::span<const Particle>> sources, std::span<const RecordRequest> requests);
 
+  /// Fits every record once more to the points of its reservoir.
+  void refit();
+
   /// The records as of the last pass.
   const IlluminationCache& cache() const { return cache_; }
 
@@ -57,11 +62,13 @@ class IlluminationTrainer {
     int passes;
     StepwiseEm em;
     BsdfSamplingFraction fraction;
+    PointReservoir reservoir;  // of the points that em was trained with
   };
 
   std::optional<double> updateAll(const ParticleNeighbours& neighbours);
   void makeRecords(const ParticleNeighbours& neighbours, std::span<const RecordRequest> requests);
   std::optional<Training> makeRecord(const ParticleNeighbours& neighbours, const RecordRequest& request) const;
+  PointReservoir reservoirAt(const Vec3& x) const;
   void shrinkRadius(Training& record) const;
   void rebuildCache();
 

@@ -52,6 +52,7 @@ class StepwiseEm {
   static constexpr float kMinDeterminant = 1e-11f;  ///< its square root is the floor of each eigenvalue of Σ
   static constexpr double kTolerance = 3e-3;  ///< change of the mean log-likelihood (nats) that ends the first fit
   static constexpr int kMaxSweeps = 250;      ///< largest number of sweeps of the first fit
+  static constexpr int kMaxRefitSweeps = 4;   ///< largest number of sweeps of a refit
 
   /// A mixture with this number of Gaussians. Throws std::runtime_error unless it is from 1 to
   /// kMaxIlluminationComponents.
@@ -64,6 +65,12 @@ class StepwiseEm {
 
   /// Performs one sweep of on-line EM over new points.
   void update(std::span<const WeightedPoint> points);
+
+  /// Batch EM with the same priors, from the current mixture, on points that stand for all those of fit and update,
+  /// such as a bounded sample of them. On-line EM discounts old points: of k it keeps the evidence of about k^0.7,
+  /// while its priors are weighed against k. Ends when the likelihood converges, at most after kMaxRefitSweeps. The
+  /// mixture can be updated further. Does nothing if no point is valid.
+  void refit(std::span<const WeightedPoint> points);
 
   const Mixture& gaussians() const { return gaussians_; }  ///< weights sum to 1
   float background() const { return background_; }         ///< u in [0,1]

@@ -76,8 +76,10 @@ class StepwiseEm::Sweep {
   explicit Sweep(const StepwiseEm& em);
   void store(StepwiseEm& em) const;
 
-  /// Adds one point with step size η; returns the mixture's density there before.
-  float add(const WeightedPoint& point, double step);
+  /// Multiplies the statistics by `keep` and adds a point with the factor `gain`; returns the mixture's density there.
+  float add(const WeightedPoint& point, double keep, double gain);
+  /// Sets the statistics to zero.
+  void clear();
   /// Performs the M step for n effective samples, against which the priors are weighed.
   void maximise(double n);
 
@@ -135,7 +137,7 @@ void StepwiseEm::Sweep<lanes>::prepare() {
 }
 
 template <int lanes>
-float StepwiseEm::Sweep<lanes>::add(const WeightedPoint& point, double step) {
+float StepwiseEm::Sweep<lanes>::add(const WeightedPoint& point, double keep, double gain) {
   const float px = point.y.x(), py = point.y.y();
   alignas(64) std::array<float, lanes> density;
   float sum = 0;
@@ -146,7 +148,7 @@ float StepwiseEm::Sweep<lanes>::add(const WeightedPoint& point, double step) {
   for (int k = 0; k < lanes; ++k) sum += density[k];
   const float flat = background_ * backgroundPdf(point.y);
   const float total = sum + flat;
-  const double keep = 1 - step, weight = step * point.weight;
+  const double weight = gain * point.weight;
   totalWeight_ = keep * totalWeight_ + weight;
   // If all densities underflow, the point is attributed to the background.
   const double scale = total > 0 ? weight / total : 0;
@@ -162,6 +164,12 @@ float StepwiseEm::Sweep<lanes>::add(const WeightedPoint& point, double step) {
     cyy_[k] = keep * cyy_[k] + q * yy;
   }
   return total;
+}
+
+template <int lanes>
+void StepwiseEm::Sweep<lanes>::clear() {
+  g_ = sx_ = sy_ = cxx_ = cxy_ = cyy_ = {};
+  totalWeight_ = backgroundWeight_ = 0;
 }
 
 // Σ_k = (b I + n V_k)/(a + n u_k), where V_k is the scatter of the component divided by the weight of all points.
@@ -265,7 +273,8 @@ double StepwiseEm::sweep(std::span<const WeightedPoint> points, double evidenceB
     for (std::size_t i = 0, at = 0; i < points.size(); ++i, at = (at + stride) % points.size()) {
       const WeightedPoint& p = points[at];
       if (!counts(p)) continue;
-      const float density = state.add(p, std::pow(static_cast<float>(samples_ + 1), -kStepExponent));
+      const double step = std::pow(static_cast<float>(samples_ + 1), -kStepExponent);
+      const float density = state.add(p, 1 - step, step);
       ++samples_;
       likelihood += p.weight * std::log(std::max(density, std::numeric_limits<float>::min()));
       weight += p.weight;
@@ -278,6 +287,31 @@ double StepwiseEm::sweep(std::span<const WeightedPoint> points, double evidenceB
     return weight > 0 ? likelihood / weight : 0.0;
   };
   return gaussians_.size() <= 8 ? run.template operator()<8>() : run.template operator()<16>();
+}
+
+void StepwiseEm::refit(std::span<const WeightedPoint> points) {
+  const Evidence evidence = evidenceOf(points);
+  if (evidence.points == 0) return;
+  const auto run = [&]<int lanes>() {
+    Sweep<lanes> state(*this);
+    double previous = -std::numeric_limits<double>::infinity();
+    for (int i = 0; i < kMaxRefitSweeps; ++i) {
+      state.clear();
+      double likelihood = 0, weight = 0;
+      for (const WeightedPoint& p : points) {
+        if (!counts(p)) continue;
+        // Means over the points, as the statistics of on-line EM are.
+        const float density = state.add(p, 1, 1.0 / static_cast<double>(evidence.points));
+        likelihood += p.weight * std::log(std::max(density, std::numeric_limits<float>::min()));
+        weight += p.weight;
+      }
+      state.maximise(evidence.effective);
+      if (std::abs(likelihood / weight - previous) <= kTolerance) break;
+      previous = likelihood / weight;
+    }
+    state.store(*this);
+  };
+  gaussians_.size() <= 8 ? run.template operator()<8>() : run.template operator()<16>();
 }
 
 float StepwiseEm::pdf(const Vec2& y) const {

@@ -180,6 +180,24 @@ TEST_CASE("guiding: training learns the direction of the light and the backgroun
   CHECK((mean - expected).norm() < 0.05f);
 }
 
+TEST_CASE("guiding: records that are fitted once more predict unseen particles better") {
+  const Vec3 towards = Vec3(0.6f, 0.0f, 0.8f);
+  const auto predicts = [&](int reservoir, bool refits) {
+    TrainingOptions options;
+    options.reservoir = reservoir;
+    IlluminationTrainer trainer(options, 10.0f);
+    for (int pass = 0; pass < 4; ++pass)
+      learn(trainer, planeParticles(20000, towards, 0.3f, 100 + pass), planeRequests(500));
+    const std::size_t records = trainer.cache().size();
+    if (refits) trainer.refit();
+    CHECK(trainer.cache().size() == records);
+    const std::vector<Particle> unseen = planeParticles(20000, towards, 0.3f, 200);
+    return trainer.learn(std::array{std::span<const Particle>(unseen)}, {}).value();
+  };
+  CHECK(predicts(500, true) > predicts(500, false) + 0.003);
+  CHECK(predicts(0, true) == predicts(0, false));
+}
+
 TEST_CASE("guiding: training places records only near particles and no duplicates") {
   IlluminationTrainer trainer({}, 10.0f);
   learn(trainer, {}, planeRequests(10));

@@ -1,4 +1,5 @@
-// The structures that order the input of training: merged sample storages, trees of particles, cubes of requests.
+// The structures that hold the input of training: merged sample storages, trees of particles, cubes of requests,
+// reservoirs of points.
 
 #include <algorithm>
 #include <array>
@@ -8,6 +9,7 @@
 
 #include "runtime/core/random.h"
 #include "runtime/guiding/particle_tree.h"
+#include "runtime/guiding/point_reservoir.h"
 #include "runtime/guiding/request_cubes.h"
 #include "runtime/guiding/sample_storage_data.h"
 
@@ -146,4 +148,44 @@ TEST_CASE("guiding: requests in different cubes of one parity are far apart") {
   CHECK(inOneCube > 1000);
   CHECK(apart == 0);
   CHECK(touching == 0);
+}
+
+TEST_CASE("guiding: a reservoir keeps all points up to its capacity") {
+  PointReservoir reservoir(10, 1, 2, 3);
+  const std::vector<WeightedPoint> points(7, WeightedPoint{{0.5f, 0}, 0.25f});
+  reservoir.add(points);
+  reservoir.add(std::vector<WeightedPoint>{{{0, 0}, 0}, {{0, 0}, std::numeric_limits<float>::infinity()}});
+  CHECK(reservoir.points().size() == 7);
+  CHECK(std::ranges::all_of(reservoir.points(), [](const WeightedPoint& p) { return p.weight == 0.25f; }));
+  for (int pass = 0; pass < 5; ++pass) reservoir.add(points);
+  CHECK(reservoir.points().size() == 10);
+  PointReservoir none(0, 1, 2, 3);
+  none.add(points);
+  CHECK(none.points().empty());
+}
+
+TEST_CASE("guiding: a reservoir estimates sums over all points without bias") {
+  // Weights over four magnitudes, largest in the first of four passes, and a sum over half of the points.
+  std::vector<WeightedPoint> points;
+  Rng rng(17);
+  double expected = 0;
+  for (int i = 0; i < 800; ++i) {
+    const float weight = std::pow(10.0f, -4 * rng.uniform()) * (i < 200 ? 5.0f : 1.0f);
+    points.push_back({{i % 2 == 0 ? 0.5f : -0.5f, 0}, weight});
+    expected += i % 2 == 0 ? weight : 0;
+  }
+  double mean = 0, square = 0;
+  constexpr int kRepeats = 4000;
+  for (std::uint64_t seed = 0; seed < kRepeats; ++seed) {
+    PointReservoir reservoir(60, seed, 5, 6);
+    for (std::size_t pass = 0; pass < 4; ++pass) reservoir.add(std::span(points).subspan(200 * pass, 200));
+    double sum = 0;
+    for (const WeightedPoint& p : reservoir.points()) sum += p.y.x() > 0 ? p.weight : 0.0f;
+    mean += sum / kRepeats;
+    square += sum * sum / kRepeats;
+  }
+  const double standardError = std::sqrt((square - mean * mean) / kRepeats);
+  INFO("mean " << mean << ", expected " << expected << ", standard error " << standardError);
+  CHECK(std::abs(mean - expected) < 4 * standardError);
+  CHECK(standardError < 0.005 * expected);
 }

@@ -191,6 +191,56 @@ TEST_CASE("mixture: on-line training approaches the true distribution with more 
   }
 }
 
+TEST_CASE("mixture: a refit to the points of all passes improves on on-line training") {
+  const Target target{.background = 0.25f};
+  double before = 0, after = 0, updated = 0, truth = 0;
+  constexpr int kRepeats = 20;
+  for (int repeat = 0; repeat < kRepeats; ++repeat) {
+    Rng rng(46, static_cast<std::uint64_t>(repeat));
+    const Points unseen = target.draw(rng, 4000);
+    truth += meanLogLikelihood(unseen, target.lobes, target.background) / kRepeats;
+    Points all = target.draw(rng, 250);
+    StepwiseEm em(8);
+    em.fit(all);
+    for (int pass = 0; pass < 4; ++pass) {
+      const Points more = target.draw(rng, 250);
+      em.update(more);
+      all.insert(all.end(), more.begin(), more.end());
+    }
+    before += likelihood(unseen, em) / kRepeats;
+    em.refit(all);
+    CHECK(isValid(em));
+    CHECK(em.samplesSeen() == 1250);
+    after += likelihood(unseen, em) / kRepeats;
+    em.update(target.draw(rng, 250));
+    updated += likelihood(unseen, em) / kRepeats;
+  }
+  INFO("log-likelihood below the truth by " << truth - before << ", after the refit " << truth - after
+                                            << ", after another update " << truth - updated);
+  CHECK(truth - after < 0.8 * (truth - before));
+  CHECK(truth - updated < truth - before);  // the update continues from the statistics of the refit
+}
+
+TEST_CASE("mixture: a refit depends only on ratios of weights and ignores invalid points") {
+  const Target target{.background = 0.3f};
+  Rng rng(47);
+  Points points = target.draw(rng, 400);
+  StepwiseEm once(8);
+  once.fit(points);
+  StepwiseEm scaled = once, none = once;
+  once.refit(points);
+  for (WeightedPoint& p : points) p.weight *= 1e-6f;
+  points.push_back({{2, 0}, 1});
+  points.push_back({{0, 0}, std::numeric_limits<float>::quiet_NaN()});
+  scaled.refit(points);
+  CHECK(same(once.gaussians(), scaled.gaussians(), 1e-4f));
+  CHECK(once.background() == Approx(scaled.background()));
+  const Mixture kept = none.gaussians();
+  none.refit(Points{{{2, 0}, 1}, {{0, 0}, 0}});
+  none.refit({});
+  CHECK(same(none.gaussians(), kept, 0));
+}
+
 TEST_CASE("mixture: the priors dominate while there are few points") {
   // A single point: u ≥ 8 / (1 + 8 + K v) wherever it is.
   StepwiseEm em(8);

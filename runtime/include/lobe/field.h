@@ -18,9 +18,11 @@ namespace lobe {
 struct FieldOptions {
   static constexpr int kMostComponents = 8;
 
-  float sceneDiagonal = 1;     ///< diagonal of the scene's bounding box in world units, > 0
-  int components = 8;          ///< Gaussians per record, 1 to kMostComponents
-  int neighbours = 250;        ///< largest number of photons, and of camera-path samples, per record and pass, ≥ 1
+  float sceneDiagonal = 1;  ///< diagonal of the scene's bounding box in world units, > 0
+  int components = 8;       ///< Gaussians per record, 1 to kMostComponents
+  int neighbours = 250;     ///< largest number of photons, and of camera-path samples, per record and pass, ≥ 1
+  /// Largest number of particles of all passes that each record keeps for refit, at 16 bytes each, ≥ 0.
+  int reservoir = 500;
   float unitFraction = 0.02f;  ///< largest radius of a record, as a fraction of sceneDiagonal, in (0, 1]
   /// Largest parallax within the radius of a record, in standard deviations of a component, > 0. Smaller values give
   /// smaller radii and more records.
@@ -41,8 +43,8 @@ Field fieldOf(IlluminationCache cache);
 /// The trained illumination. Copies are cheap and share their content: an update of one changes all of them, while
 /// frozen() and reduced() make independent fields.
 ///
-/// Threads: update and fill must not run while another thread uses the field or a copy of it. All other functions are
-/// const and may be called from any thread.
+/// Threads: update, refit and fill must not run while another thread uses the field or a copy of it. All other
+/// functions are const and may be called from any thread.
 class Field {
  public:
   /// A field without records that cannot be trained.
@@ -69,6 +71,11 @@ class Field {
   /// over the records: a measure on data that was not trained on. nullopt if no record had particles near it. Throws
   /// std::logic_error if the field cannot be trained (it was default-constructed, loaded, frozen or reduced).
   std::optional<double> update(const SampleStorage& storage);
+
+  /// Fits every record once more to a sample of the particles of all passes that were near it, which corrects what the
+  /// updates have forgotten. Intended for the end of training, before the last fill. Does nothing if
+  /// FieldOptions::reservoir is 0. Throws std::logic_error as update does.
+  void refit();
 
   /// Creates the records that `requests` asks for, from the particles of `particles`; existing records are not changed.
   /// Intended for the end of training, because the radii of records shrink in updates and leave gaps. Throws

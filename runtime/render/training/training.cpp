@@ -12,10 +12,12 @@
 namespace lobe {
 namespace {
 
-/// Importance only guides photons; half the components and neighbours suffice (measured by lobebench-illumination).
+/// Importance only guides photons; half the components and neighbours suffice (measured by lobebench-illumination), and
+/// it is no longer needed when records are fitted once more.
 FieldOptions importanceOptions(FieldOptions options) {
   options.components = std::max(1, options.components / 2);
   options.neighbours = std::max(1, options.neighbours / 2);
+  options.reservoir = 0;
   return options;
 }
 
@@ -97,8 +99,10 @@ class Training {
     return report;
   }
 
-  /// Fills the gaps between records whose radii have shrunk since the last requests.
+  /// Fits the records to the particles of all passes, and fills the gaps between records whose radii have shrunk since
+  /// the last requests.
   void finish(int passes, double size) {
+    radiance_.refit();
     radiance_.fill(tracer_->traceImportons(passes, fractionOf(plan_.importons, size), {}).radiance, samples_);
   }
 
