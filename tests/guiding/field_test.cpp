@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <vector>
 
 #include <catch2/catch.hpp>
@@ -166,4 +167,88 @@ TEST_CASE("guiding: a recorded path gives each vertex its incident radiance") {
   CHECK(samples[0].distance == 2);
   CHECK(samples[1].weight == Approx(1 / 0.5f * 8));
   CHECK(samples[1].distance == std::numeric_limits<float>::infinity());
+}
+
+TEST_CASE("guiding: the part of the reflection that mixtures do not represent is left to the BSDF") {
+  const Field field = trained();
+  for (const float undescribed : {0.0f, 0.4f, 1.0f}) {
+    CAPTURE(undescribed);
+    SurfaceDistribution guide(field, floorAt(0.5f, 0.5f));
+    guide.describe({.lobes = {}, .diffuseAlbedo = 0.5f, .undescribedFraction = undescribed}, nullptr);
+    CHECK(guide.bsdfProbability() == Approx(1 - 0.5f * (1 - undescribed)));
+    int guided = 0;
+    for (int i = 0; i < 1000; ++i) {
+      float choice = (static_cast<float>(i) + 0.5f) / 1000;
+      guided += guide.choose(choice) != Strategy::bsdf;
+    }
+    CHECK(guided == Approx(500 * (1 - undescribed)).margin(2));
+    // What the undescribed part reflects cannot be estimated.
+    CHECK(guide.reflectedRadiance(0.5f).has_value() == (undescribed == 0));
+  }
+}
+
+TEST_CASE("guiding: on the back of a surface, directions follow the light that arrives there") {
+  // Light from below that no mirroring leaves in place. The field's frame is that of the world.
+  const Vec3 light = Vec3(0.6f, 0.35f, -0.7f).normalized();
+  SampleStorage storage;
+  Rng rng(3);
+  for (std::uint64_t i = 0; i < 2000; ++i) {
+    const Vec3 d = (light + 0.05f * Vec3(rng.uniform(), rng.uniform(), rng.uniform())).normalized();
+    storage.beginPath(i);
+    const Float3 position{rng.uniform(), rng.uniform(), 0};
+    storage.addPhoton(position, {0, 0, -1}, {d.x(), d.y(), d.z()}, 1, 3, 1);
+    storage.requestRecord(position, {0, 0, -1});
+  }
+  Field field(smallField());
+  field.update(storage);
+  ShadingPoint below = floorAt(0.5f, 0.5f);
+  below.wo = {0, 0, -1};
+  CHECK(!SurfaceDistribution(field, floorAt(0.5f, 0.5f)).hasRecord());
+  SurfaceDistribution guide(field, below);
+  REQUIRE(guide.hasRecord());
+  guide.describe({.lobes = {}, .diffuseAlbedo = 0.5f}, nullptr);
+  const float towards = guide.guidedPdf({light.x(), light.y(), light.z()});
+  CHECK(towards > 1);
+  CHECK(guide.guidedPdf({light.x(), -light.y(), light.z()}) < 0.1f * towards);
+  CHECK(guide.guidedPdf({-light.x(), light.y(), light.z()}) < 0.1f * towards);
+  CHECK(guide.guidedPdf({-light.x(), -light.y(), light.z()}) < 0.1f * towards);
+  CHECK(guide.guidedPdf({light.x(), light.y(), -light.z()}) == 0);
+  int near = 0;
+  for (int i = 0; i < 200; ++i) {
+    const auto sample = guide.sample(Strategy::illumination, rng.uniform(), {rng.uniform(), rng.uniform()});
+    near += sample && sample->wi.x * light.x() + sample->wi.y * light.y() + sample->wi.z * light.z() > 0.95f;
+  }
+  CHECK(near > 180);
+}
+
+TEST_CASE("guiding: filling creates the missing records and keeps the others") {
+  std::vector<int> all(2000);
+  std::iota(all.begin(), all.end(), 0);
+  const SampleStorage particles = paths(all);
+  SampleStorage pass;  // the same photons with a request in one place only
+  for (const int i : all) {
+    Rng rng(5, 0, static_cast<std::uint64_t>(i));
+    const Float3 position{rng.uniform(), rng.uniform(), 0};
+    pass.beginPath(static_cast<std::uint64_t>(i));
+    pass.addPhoton(position, {0, 0, 1}, {0.6f, 0, 0.8f}, 1, 3, 1);
+    if (i == 0) pass.requestRecord({0.1f, 0.1f, 0}, {0, 0, 1});
+  }
+  Field field(smallField());
+  field.update(pass);
+  REQUIRE(field.records() == 1);
+  const ShadingPoint missing = floorAt(0.95f, 0.95f), served = floorAt(0.1f, 0.1f);
+  REQUIRE(!SurfaceDistribution(field, missing).hasRecord());
+  SampleStorage requests;
+  requests.beginPath(0);
+  requests.requestRecord(missing.position, missing.normal);
+  requests.requestRecord(served.position, served.normal);
+  field.fill(requests, particles);
+  CHECK(field.records() == 2);
+  CHECK(SurfaceDistribution(field, missing).hasRecord());
+  // Without particles nothing can be created.
+  SampleStorage elsewhere;
+  elsewhere.beginPath(0);
+  elsewhere.requestRecord({5, 5, 0}, {0, 0, 1});
+  field.fill(elsewhere, particles);
+  CHECK(field.records() == 2);
 }

@@ -23,15 +23,16 @@ namespace {
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kIrradiance = 2;
 
-/// A strongly anisotropic lobe with its compiled cache.
+/// A lobe, by default a strongly anisotropic one, with its compiled cache.
 class CompiledLobe {
  public:
-  CompiledLobe() : lobe_(conductorLobe(0.04, 0.4)) {
+  explicit CompiledLobe(LobePtr lobe = conductorLobe(0.04, 0.4), FitMethod method = FitMethod::wem)
+      : lobe_(std::move(lobe)) {
     CompileOptions options;
     options.directory = folder_.path();
     options.directions = 256;
     options.settings.samples = 1024;
-    options.settings.method = FitMethod::wem;
+    options.settings.method = method;
     runCompile(planCompile({{lobe_, {}}}, options).front(), {});
     const std::vector<LobeRequest> requests{{lobe_->model(), lobe_->key(), lobe_->revision(), "test"}};
     caches_.emplace(folder_.path(), requests, "");
@@ -180,6 +181,26 @@ TEST_CASE(
     REQUIRE(guide.reflectedRadiance(albedo));
     CHECK(*guide.reflectedRadiance(albedo) == Approx(albedo / kPi * kIrradiance).epsilon(1e-4));
   }
+}
+
+TEST_CASE(
+    "quality: light reflected by a lobe too narrow for mixtures is left to the BSDF, and is part of the estimate") {
+  const CompiledLobe narrow(conductorLobe(1e-3, 1e-3), FitMethod::automatic);
+  const Field field = fieldOf(IlluminationCache({recordOfLight()}, 1));
+  const ShadingPoint point = pointTurned(0.3f, direction(35, 40));
+  constexpr float kDiffuse = 0.5f, kTint = 0.4f;
+  const TintedLobe lobe{0, kTint};
+  SurfaceDistribution diffuse(field, point), both(field, point);
+  diffuse.describe({.lobes = {}, .diffuseAlbedo = kDiffuse}, &narrow.caches());
+  both.describe({.lobes = {&lobe, 1}, .diffuseAlbedo = kDiffuse}, &narrow.caches());
+  REQUIRE(both.decision() == GuidingDecision::illumination);
+  REQUIRE(diffuse.reflectedRadiance(0));
+  REQUIRE(both.reflectedRadiance(0));
+  const float more = (*both.reflectedRadiance(0) - *diffuse.reflectedRadiance(0)) / (kIrradiance / kPi);
+  CHECK(more > 0.5f * kTint);
+  CHECK(more < 1.001f * kTint);  // the lobe's albedo is at most one
+  CHECK((1 - both.bsdfProbability()) / (1 - diffuse.bsdfProbability()) ==
+        Approx(kDiffuse / (kDiffuse + more)).epsilon(1e-3));
 }
 
 TEST_CASE("quality: the region that a record serves shrinks where parallax moves narrow light") {
