@@ -161,7 +161,9 @@ struct Guiding {
   std::optional<Pilot> pilot;
 
   /// Time spent before rendering.
-  double seconds() const { return secondsLights + training.report.seconds + secondsCounts + (pilot ? pilot->seconds : 0); }
+  double seconds() const {
+    return secondsLights + training.report.seconds + secondsCounts + (pilot ? pilot->seconds : 0);
+  }
   const LobeCacheSet* cachesOrNull() const { return caches ? &*caches : nullptr; }
   std::size_t unreducedBytes = 0;  ///< size of the records before merging
 
