@@ -1,20 +1,15 @@
 #include "schema/container.h"
 
-#include <fcntl.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <bit>
-#include <cerrno>
 #include <cstddef>
 #include <cstring>
 #include <stdexcept>
-#include <utility>
 
 #include <fmt/format.h>
 #include <xxhash.h>
+
+#include "runtime/core/files.h"
 
 namespace lobe {
 namespace {
@@ -42,10 +37,6 @@ std::uint64_t contentHash(const Header& header, std::span<const std::byte> paylo
   throw std::runtime_error(name + ": " + fault);
 }
 
-[[noreturn]] void refuseToOpen(const std::filesystem::path& path, const char* fault) {
-  refuse(path.string(), fmt::format("cannot open: {}", fault));
-}
-
 /// Replaces unprintable characters, because the message may be written to a terminal.
 std::string printable(const char (&kind)[4]) {
   std::string text(kind, sizeof(kind));
@@ -64,42 +55,11 @@ void checkVersion(const FileFormat& format, const Header& header, const std::str
 
 }  // namespace
 
-MappedFile::MappedFile(const std::filesystem::path& path) {
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (file < 0) refuseToOpen(path, std::strerror(errno));
-  struct stat status {};
-  const char* fault = nullptr;
-  if (::fstat(file, &status) != 0)
-    fault = std::strerror(errno);
-  else if (S_ISDIR(status.st_mode))
-    fault = "is a directory";
-  else if (!S_ISREG(status.st_mode))
-    fault = "not a regular file";
-  else if (status.st_size > 0) {
-    void* data = ::mmap(nullptr, static_cast<std::size_t>(status.st_size), PROT_READ, MAP_PRIVATE, file, 0);
-    if (data == MAP_FAILED) {
-      fault = std::strerror(errno);
-    } else {
-      data_ = static_cast<const std::byte*>(data);
-      size_ = static_cast<std::size_t>(status.st_size);
-    }
-  }
-  ::close(file);
-  if (fault) refuseToOpen(path, fault);
-}
+FileContent::FileContent(const std::filesystem::path& path)
+    : bytes_(nameErrors(path, [&] { return readFile(path); })) {}
 
-MappedFile::MappedFile(MappedFile&& other) noexcept
-    : data_(std::exchange(other.data_, nullptr)), size_(std::exchange(other.size_, 0)) {}
-
-MappedFile& MappedFile::operator=(MappedFile&& other) noexcept {
-  std::swap(data_, other.data_);
-  std::swap(size_, other.size_);
-  return *this;
-}
-
-MappedFile::~MappedFile() {
-  if (data_) ::munmap(const_cast<std::byte*>(data_), size_);
-}
+FileContent::FileContent(std::span<const std::byte> bytes)
+    : bytes_(reinterpret_cast<const char*>(bytes.data()), bytes.size()) {}
 
 std::vector<std::byte> wrapPayload(const FileFormat& format, std::span<const std::byte> payload) {
   Header header{};

@@ -29,19 +29,21 @@ inline std::string_view nameOf(const FileFormat& format) {
   return {format.kind.data(), format.kind.size()};
 }
 
-/// A read-only memory map of a whole file. Move-only.
-class MappedFile {
+/// The content of a whole file in memory, aligned to 8 bytes if it has a header. It is a copy, so that what has been
+/// verified cannot change when another program writes to the file or truncates it. Move-only, because views refer to
+/// it; they stay valid when it is moved.
+class FileContent {
  public:
-  /// Throws std::runtime_error that names the file if it cannot be opened or is not a regular file.
-  explicit MappedFile(const std::filesystem::path& path);
-  MappedFile(MappedFile&& other) noexcept;
-  MappedFile& operator=(MappedFile&& other) noexcept;
-  ~MappedFile();
-  std::span<const std::byte> bytes() const { return {data_, size_}; }
+  /// Throws std::runtime_error that names the file if it cannot be read or is not a regular file.
+  explicit FileContent(const std::filesystem::path& path);
+  /// A copy of bytes in memory.
+  explicit FileContent(std::span<const std::byte> bytes);
+  FileContent(FileContent&&) noexcept = default;
+  FileContent& operator=(FileContent&&) noexcept = default;
+  std::span<const std::byte> bytes() const { return std::as_bytes(std::span(bytes_)); }
 
  private:
-  const std::byte* data_ = nullptr;
-  std::size_t size_ = 0;
+  std::string bytes_;  // in place only if it is shorter than a header
 };
 
 /// The bytes of a file: header and payload.

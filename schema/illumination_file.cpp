@@ -60,7 +60,7 @@ IlluminationInfo readInfo(const fb::Illumination& file) {
 
 }  // namespace
 
-IlluminationFile::IlluminationFile(MappedFile file, const std::filesystem::path& path) : file_(std::move(file)) {
+IlluminationFile::IlluminationFile(FileContent file, const std::filesystem::path& path) : file_(std::move(file)) {
   const std::string name = path.string();
   const std::span<const std::byte> payload = unwrapPayload(kIlluminationFormat, file_.bytes(), name);
   header_ = containerHeader(file_.bytes());
@@ -81,7 +81,11 @@ IlluminationFile::IlluminationFile(MappedFile file, const std::filesystem::path&
 }
 
 IlluminationFile IlluminationFile::open(const std::filesystem::path& path) {
-  return IlluminationFile(MappedFile(path), path);
+  return IlluminationFile(FileContent(path), path);
+}
+
+IlluminationFile IlluminationFile::parse(std::span<const std::byte> bytes, const std::filesystem::path& path) {
+  return IlluminationFile(FileContent(bytes), path);
 }
 
 std::vector<std::byte> encodeIllumination(const IlluminationInfo& info, std::span<const StoredIllumination> records,

@@ -44,13 +44,15 @@ struct IlluminationInfo {
   float unit = 1;
 };
 
-/// An open file, memory-mapped and validated. Immutable and move-only.
+/// A file, read and validated. Immutable and move-only.
 class IlluminationFile {
  public:
-  /// Maps the file and checks its structure and content: indices in range, orthonormal normals and tangents, positive
+  /// Reads the file and checks its structure and content: indices in range, orthonormal normals and tangents, positive
   /// radii, weights that sum to one, positive definite covariances, finite numbers. Throws std::runtime_error that
   /// names the file and the fault.
   static IlluminationFile open(const std::filesystem::path& path);
+  /// The same for the content of a file; path names it in messages.
+  static IlluminationFile parse(std::span<const std::byte> bytes, const std::filesystem::path& path);
 
   const IlluminationInfo& info() const { return info_; }
   std::span<const StoredIllumination> records() const { return records_; }
@@ -61,8 +63,8 @@ class IlluminationFile {
   std::size_t bytes() const { return file_.bytes().size(); }
 
  private:
-  IlluminationFile(MappedFile file, const std::filesystem::path& path);
-  MappedFile file_;
+  IlluminationFile(FileContent file, const std::filesystem::path& path);
+  FileContent file_;
   IlluminationInfo info_;
   std::span<const StoredIllumination> records_;
   std::span<const CacheComponent> components_;

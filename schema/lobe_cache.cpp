@@ -53,7 +53,7 @@ LobeCacheInfo readInfo(const fb::LobeCache& cache, const std::string& file) {
 
 }  // namespace
 
-LobeCache::LobeCache(MappedFile file, const std::filesystem::path& path) : file_(std::move(file)) {
+LobeCache::LobeCache(FileContent file, const std::filesystem::path& path) : file_(std::move(file)) {
   const std::string name = path.string();
   const std::span<const std::byte> payload = unwrapPayload(kLobeFormat, file_.bytes(), name);
   header_ = containerHeader(file_.bytes());
@@ -75,7 +75,7 @@ LobeCache::LobeCache(MappedFile file, const std::filesystem::path& path) : file_
 }
 
 LobeCache LobeCache::open(const std::filesystem::path& path) {
-  return LobeCache(MappedFile(path), path);
+  return LobeCache(FileContent(path), path);
 }
 
 std::optional<FitMethod> fitMethodOf(std::string_view name) {

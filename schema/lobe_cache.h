@@ -54,11 +54,11 @@ struct LobeCacheInfo {
   bool quarter = false;  ///< directions must be mirrored by Mirror::intoQuadrant, and mixtures mirrored back
 };
 
-/// An open cache, memory-mapped and validated. Immutable and move-only.
+/// A cache, read and validated. Immutable and move-only.
 class LobeCache {
  public:
-  /// Maps the file and checks its structure and content: one look-up per grid entry, indices in range, weights that sum
-  /// to one, positive definite covariances, finite numbers. Throws std::runtime_error that names the file and the
+  /// Reads the file and checks its structure and content: one look-up per grid entry, indices in range, weights that
+  /// sum to one, positive definite covariances, finite numbers. Throws std::runtime_error that names the file and the
   /// fault.
   static LobeCache open(const std::filesystem::path& path);
 
@@ -76,8 +76,8 @@ class LobeCache {
   std::size_t bytes() const { return file_.bytes().size(); }
 
  private:
-  LobeCache(MappedFile file, const std::filesystem::path& path);
-  MappedFile file_;
+  LobeCache(FileContent file, const std::filesystem::path& path);
+  FileContent file_;
   LobeCacheInfo info_;
   std::span<const CacheRecord> records_;
   std::span<const CacheComponent> components_;

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <stdexcept>
 #include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -37,69 +38,72 @@ fs::path targetOf(const fs::path& path) {
   std::error_code error;
   fs::path target = followLinks(path);
   const fs::file_status status = fs::status(target, error);
+  if (error == std::errc::filename_too_long) refuse(path, ENAMETOOLONG);
   if (fs::is_directory(status)) throw std::runtime_error(path.string() + ": cannot write: is a directory");
   if (fs::exists(status) && !fs::is_regular_file(status))
     throw std::runtime_error(path.string() + ": cannot write: not a regular file");
   return target;
 }
 
-/// Creates an empty temporary file in the folder of target, with the same extension, from which writers may derive the
-/// format.
-fs::path createBeside(const fs::path& target, const fs::path& path) {
-  static std::atomic<unsigned> counter = 0;
-  for (;;) {
-    fs::path candidate = target.parent_path() / fmt::format(".{}.{}-{}{}", target.stem().string(), ::getpid(),
-                                                            counter++, target.extension().string());
-    const int file = ::open(candidate.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (file >= 0) {
-      ::close(file);
-      return candidate;
+/// A file beside target that is removed unless it replaces target.
+class Temporary {
+ public:
+  /// Creates an empty file. path names the target in messages.
+  Temporary(const fs::path& target, const fs::path& path) : target_(target), path_(path) {
+    static std::atomic<unsigned> counter = 0;
+    do {
+      temporary_ = target.parent_path() / nameFor(target, counter++);
+      file_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    } while (file_ < 0 && errno == EEXIST);
+    if (file_ < 0) refuse(path_, errno);
+  }
+  Temporary(const Temporary&) = delete;
+  Temporary& operator=(const Temporary&) = delete;
+  ~Temporary() {
+    close();
+    if (!replaced_) ::unlink(temporary_.c_str());
+  }
+
+  void write(std::span<const std::byte> bytes) {
+    while (!bytes.empty()) {
+      const ssize_t written = ::write(file_, bytes.data(), bytes.size());
+      if (written >= 0)
+        bytes = bytes.subspan(static_cast<std::size_t>(written));
+      else if (errno != EINTR)
+        refuse(path_, errno);
     }
-    if (errno != EEXIST) refuse(path, errno);
   }
-}
 
-/// Waits until the content is on the disk. Otherwise a power failure could preserve the rename but lose the content.
-void flushToDisk(const fs::path& temporary, const fs::path& path) {
-  const int file = ::open(temporary.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) refuse(path, errno);
-  const int error = ::fsync(file) == 0 ? 0 : errno;
-  ::close(file);
-  if (error != 0 && error != EINVAL) refuse(path, error);
-}
-
-void writeAll(const fs::path& temporary, std::span<const std::byte> bytes, const fs::path& path) {
-  const int file = ::open(temporary.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC);
-  if (file < 0) refuse(path, errno);
-  int error = 0;
-  while (!bytes.empty() && error == 0) {
-    const ssize_t written = ::write(file, bytes.data(), bytes.size());
-    if (written >= 0)
-      bytes = bytes.subspan(static_cast<std::size_t>(written));
-    else if (errno != EINTR)
-      error = errno;
+  void replaceTarget() {
+    // Waits until the content is on the disk. Otherwise a power failure could preserve the rename but lose the content.
+    if (::fsync(file_) != 0 && errno != EINVAL) refuse(path_, errno);
+    if (close() != 0) refuse(path_, errno);
+    if (::rename(temporary_.c_str(), target_.c_str()) != 0) refuse(path_, errno);
+    replaced_ = true;
   }
-  if (::close(file) != 0 && error == 0) error = errno;
-  if (error != 0) refuse(path, error);
-}
+
+ private:
+  /// A hidden name that begins like the target's; it is shortened, because the target's name may have the maximum
+  /// length already.
+  static std::string nameFor(const fs::path& target, unsigned number) {
+    constexpr std::size_t kMaxLength = 255;
+    const std::string unique = fmt::format(".{}-{}", ::getpid(), number);
+    return fmt::format(".{}{}", target.filename().string().substr(0, kMaxLength - 1 - unique.size()), unique);
+  }
+
+  int close() { return file_ < 0 ? 0 : ::close(std::exchange(file_, -1)); }
+
+  fs::path target_, path_, temporary_;
+  int file_ = -1;
+  bool replaced_ = false;
+};
 
 }  // namespace
 
-void writeAtomically(const fs::path& path, const std::function<void(const fs::path&)>& write) {
-  const fs::path target = targetOf(path);
-  const fs::path temporary = createBeside(target, path);
-  try {
-    write(temporary);
-    flushToDisk(temporary, path);
-    if (::rename(temporary.c_str(), target.c_str()) != 0) refuse(path, errno);
-  } catch (...) {
-    ::unlink(temporary.c_str());
-    throw;
-  }
-}
-
 void writeAtomically(const fs::path& path, std::span<const std::byte> bytes) {
-  writeAtomically(path, [&](const fs::path& temporary) { writeAll(temporary, bytes, path); });
+  Temporary temporary(targetOf(path), path);
+  temporary.write(bytes);
+  temporary.replaceTarget();
 }
 
 void writeAtomically(const fs::path& path, const std::string& text) {
@@ -107,7 +111,7 @@ void writeAtomically(const fs::path& path, const std::string& text) {
 }
 
 void checkWritable(const fs::path& path) {
-  ::unlink(createBeside(targetOf(path), path).c_str());
+  const Temporary created(targetOf(path), path);
 }
 
 }  // namespace lobe

@@ -2,18 +2,14 @@
 // Atomic writing of output files: a temporary file in the same folder is written completely, then renamed.
 
 #include <filesystem>
-#include <functional>
 #include <span>
 #include <string>
 
 namespace lobe {
 
-/// Calls `write` with the path of a temporary file in the folder of `path`, and renames the file to `path` when `write`
-/// returns. If `write` throws, the temporary file is removed and the exception is passed on. The folder must exist.
-/// Throws std::runtime_error that names `path` if the file cannot be written.
-void writeAtomically(const std::filesystem::path& path, const std::function<void(const std::filesystem::path&)>& write);
-
-/// Writes bytes or text atomically.
+/// Writes bytes or text to a temporary file in the folder of `path`, and renames it to `path`. If that fails, the
+/// temporary file is removed, a file at `path` keeps its content, and std::runtime_error that names `path` is thrown.
+/// The folder must exist.
 void writeAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void writeAtomically(const std::filesystem::path& path, const std::string& text);
 

@@ -27,7 +27,7 @@ auto nameErrors(const std::filesystem::path& path, Read&& read) {
   try {
     return read();
   } catch (const std::bad_alloc&) {
-    throw std::runtime_error(fmt::format("{}: not enough memory to read it", path.string()));
+    throw std::runtime_error(fmt::format("{}: not enough memory", path.string()));
   } catch (const std::exception& e) {
     throw std::runtime_error(fmt::format("{}: {}", path.string(), e.what()));
   }

@@ -9,6 +9,7 @@
 #include <ImfDoubleAttribute.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
+#include <ImfIO.h>
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfStringAttribute.h>
@@ -17,6 +18,7 @@
 
 #include "runtime/core/atomic_file.h"
 #include "runtime/core/colour.h"
+#include "runtime/core/files.h"
 
 #define STB_IMAGE_WRITE_IMPLEMENTATION
 #define STB_IMAGE_WRITE_STATIC
@@ -52,14 +54,33 @@ Imf::Header makeHeader(const Image& image, const ImageAttributes& attributes) {
   return header;
 }
 
-void writeExr(const std::filesystem::path& path, const Image& image, const ImageAttributes& attributes) {
+/// Collects a file in memory.
+class MemoryStream : public Imf::OStream {
+ public:
+  MemoryStream() : OStream("memory") {}
+  void write(const char text[], int size) override {
+    const std::size_t end = position_ + static_cast<std::size_t>(size);
+    if (bytes_.size() < end) bytes_.resize(end);
+    std::memcpy(bytes_.data() + position_, text, static_cast<std::size_t>(size));
+    position_ = end;
+  }
+  std::uint64_t tellp() override { return position_; }
+  void seekp(std::uint64_t position) override { position_ = position; }
+  std::span<const std::byte> bytes() const { return bytes_; }
+
+ private:
+  std::vector<std::byte> bytes_;
+  std::size_t position_ = 0;
+};
+
+void encodeExr(Imf::OStream& stream, const Image& image, const ImageAttributes& attributes) {
   Imf::FrameBuffer frame;
   const char* base = reinterpret_cast<const char*>(image.pixels.data());
   const std::size_t stride = sizeof(Rgb);
   for (int c = 0; c < 3; ++c)
     frame.insert(std::string(1, "RGB"[c]),
                  Imf::Slice(Imf::FLOAT, const_cast<char*>(base) + c * sizeof(float), stride, stride * image.width));
-  Imf::OutputFile file(path.c_str(), makeHeader(image, attributes));
+  Imf::OutputFile file(stream, makeHeader(image, attributes));
   file.setFrameBuffer(frame);
   file.writePixels(image.height);
 }
@@ -89,17 +110,14 @@ void writePng(const std::filesystem::path& path, int width, int height, const st
 void writeImage(const std::filesystem::path& path, const Image& image, const ImageAttributes& attributes) {
   checkImageName(path);
   if (extensionOf(path) == ".png") return writePng(path, image.width, image.height, encodePixels(image));
-  writeAtomically(path, [&](const std::filesystem::path& temporary) {
-    try {
-      writeExr(temporary, image, attributes);
-    } catch (const std::exception& e) {
-      throw std::runtime_error(fmt::format("{}: {}", path.string(), e.what()));
-    }
-  });
+  MemoryStream stream;
+  nameErrors(path, [&] { encodeExr(stream, image, attributes); });
+  writeAtomically(path, stream.bytes());
 }
 
 ImageAttributes readAttributes(const std::filesystem::path& path) {
   ImageAttributes attributes;
+  nameErrors(path, [&] { openFile(path); });  // refuses a pipe, which OpenEXR would wait for
   if (!Imf::isOpenExrFile(path.c_str())) return attributes;
   try {
     const Imf::InputFile file(path.c_str());

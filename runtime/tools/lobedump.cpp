@@ -193,7 +193,7 @@ void runPlot(const LobeCache& cache, Options& o) {
 // ---- Illumination
 
 bool isIllumination(const std::string& file) {
-  return isOfKind(kIlluminationFormat, MappedFile(file).bytes());
+  return isOfKind(kIlluminationFormat, FileContent(file).bytes());
 }
 
 void validateForIllumination(const Options& o) {

@@ -2,12 +2,15 @@
 #include <bit>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <limits>
 #include <span>
+
+#include <sys/resource.h>
 
 #include "lobe_generated.h"
 #include "runtime/core/atomic_file.h"
@@ -160,8 +163,18 @@ TEST_CASE("schema: errors name the kind of fault") {
   bytes = good;
   std::memcpy(bytes.data() + 4, "ILLU", 4);
   CHECK(contains(opener.fault(bytes), "kind 'ILLU'"));
-  CHECK_THROWS_WITH(LobeCache::open(opener.folder.path), Catch::Contains("is a directory"));
-  CHECK_THROWS_WITH(LobeCache::open(opener.folder.path / "none.lobe"), Catch::Contains("No such file"));
+  CHECK_THROWS_WITH(LobeCache::open(opener.folder.path), Catch::Contains("is a folder"));
+  CHECK_THROWS_WITH(LobeCache::open(opener.folder.path / "none.lobe"), Catch::Contains("no such file"));
+}
+
+TEST_CASE("schema: a cache that has been read does not depend on its file any more") {
+  const Opener opener;
+  writeAtomically(opener.path, std::span<const std::byte>(smallCache().encode()));
+  const LobeCache cache = LobeCache::open(opener.path);
+  const std::vector<CacheRecord> before(cache.records().begin(), cache.records().end());
+  std::filesystem::resize_file(opener.path, 0);
+  CHECK(std::ranges::equal(std::as_bytes(cache.records()), std::as_bytes(std::span(before))));
+  CHECK(cache.lookup(0) < before.size());
 }
 
 TEST_CASE("schema: a newer minor version is read and another major version rejected") {
@@ -217,13 +230,14 @@ TEST_CASE("schema: files are written completely or not at all") {
   const TemporaryFolder folder;
   const fs::path path = folder.path / "out.png";
   writeAtomically(path, std::string("first"));
-  CHECK_THROWS_WITH(writeAtomically(path,
-                                    [](const fs::path& temporary) {
-                                      CHECK(temporary.extension() == ".png");
-                                      std::ofstream(temporary) << "half";
-                                      throw std::runtime_error("the writer failed");
-                                    }),
-                    "the writer failed");
+  rlimit limit{};
+  getrlimit(RLIMIT_FSIZE, &limit);
+  const auto before = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{10, limit.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &small);
+  CHECK_THROWS_WITH(writeAtomically(path, std::string(100, 'x')), path.string() + ": cannot write: File too large");
+  setrlimit(RLIMIT_FSIZE, &limit);
+  std::signal(SIGXFSZ, before);
   std::string text;
   std::ifstream(path) >> text;
   CHECK(text == "first");
