@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
+#include <mutex>
 #include <numbers>
+#include <tuple>
 #include <utility>
 
 #include "materials/lobes/fresnel.h"
@@ -124,10 +127,22 @@ float RoughTransmittance::operator()(float cosine) const {
   return (1.0f - w) * table_[at] + w * table_[at + 1];
 }
 
+/// Scenes may have thousands of materials with few distinct interfaces, so those in use share their tables.
+std::shared_ptr<const RoughTransmittance> RoughTransmittance::shared(const Microfacet& microfacet, double eta) {
+  using Key = std::tuple<Microfacet::Kind, double, double>;
+  static std::mutex mutex;
+  static std::map<Key, std::weak_ptr<const RoughTransmittance>> tables;
+  const std::lock_guard lock(mutex);
+  std::weak_ptr<const RoughTransmittance>& entry = tables[{microfacet.kind(), microfacet.alphaU(), eta}];
+  std::shared_ptr<const RoughTransmittance> table = entry.lock();
+  if (!table) entry = table = std::make_shared<const RoughTransmittance>(microfacet, eta);
+  return table;
+}
+
 VaryingTransmittance::VaryingTransmittance(const Roughness& roughness, double eta) {
   for (const Microfacet& level : roughness.levels()) {
     const double alpha = std::sqrt(level.alphaU() * level.alphaV());
-    levels_.emplace_back(Microfacet(level.kind(), alpha, alpha), eta);
+    levels_.push_back(RoughTransmittance::shared(Microfacet(level.kind(), alpha, alpha), eta));
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "materials/lobes/roughness.h"
@@ -14,6 +15,8 @@ class RoughTransmittance {
  public:
   /// eta: index inside over index outside. The distribution must be isotropic. Deterministic; takes about 1 ms.
   RoughTransmittance(const Microfacet& microfacet, double eta);
+  /// The same table for all callers with equal arguments, as long as one of them keeps it. Thread-safe.
+  static std::shared_ptr<const RoughTransmittance> shared(const Microfacet& microfacet, double eta);
 
   /// Transmittance from outside for cosθ in [0,1], by linear interpolation.
   float operator()(float cosine) const;
@@ -49,11 +52,11 @@ class VaryingTransmittance {
   template <typename Value>
   float between(const LocalRoughness& at, const Value& value) const {
     const auto level = static_cast<std::size_t>(at.level);
-    const float here = value(levels_[level]);
-    return at.next > 0.0f ? here + at.next * (value(levels_[level + 1]) - here) : here;
+    const float here = value(*levels_[level]);
+    return at.next > 0.0f ? here + at.next * (value(*levels_[level + 1]) - here) : here;
   }
 
-  std::vector<RoughTransmittance> levels_;
+  std::vector<std::shared_ptr<const RoughTransmittance>> levels_;
 };
 
 }  // namespace lobe

@@ -301,6 +301,15 @@ TEST_CASE("materials: rough transmittance converges to the smooth one and matche
   CHECK(t(static_cast<float>(wo.z())) == Approx(mean.value()).margin(4.0 * mean.error() + 2e-3));
 }
 
+TEST_CASE("materials: equal interfaces share their transmittance table while it is used") {
+  const Microfacet m(Microfacet::Kind::ggx, 0.21, 0.21), other(Microfacet::Kind::beckmann, 0.21, 0.21);
+  const auto table = RoughTransmittance::shared(m, 1.5);
+  CHECK(table == RoughTransmittance::shared(m, 1.5));
+  CHECK(table != RoughTransmittance::shared(m, 1.4));
+  CHECK(table != RoughTransmittance::shared(other, 1.5));
+  CHECK((*table)(0.5f) == RoughTransmittance(m, 1.5)(0.5f));
+}
+
 TEST_CASE("materials: a dielectric conserves energy and refracts by Snell's law") {
   const BsdfPtr glass = bsdfOf("dielectric", {{"int_ior", 1.5}, {"ext_ior", 1.0}});
   for (const double elevation : {0.0, 30.0, 60.0, 89.0, 120.0, 135.0, 179.0}) {
