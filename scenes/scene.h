@@ -197,9 +197,10 @@ struct Scene {
   PixelFilter filter;
   std::optional<int> maxDepth;  ///< maximum path length in segments, 0 or more, from the file
   EmitterVisibility emitterVisibility = EmitterVisibility::shown;
-  float scale = 1;                    ///< power of two by which all lengths of the file were multiplied
-  std::vector<std::string> notes;     ///< what was read but has no effect (integrators, samplers, film options)
-  std::vector<std::string> warnings;  ///< what was not read as written, and what lenient reading left out
+  float scale = 1;                           ///< power of two by which all lengths of the file were multiplied
+  std::vector<std::filesystem::path> files;  ///< named by the file: includes, meshes, images, measurements
+  std::vector<std::string> notes;            ///< what was read but has no effect (integrators, samplers, film options)
+  std::vector<std::string> warnings;         ///< what was not read as written, and what lenient reading left out
 };
 
 }  // namespace lobe

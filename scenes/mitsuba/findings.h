@@ -2,6 +2,7 @@
 // Faults, warnings and notes that are found while reading a scene file, each with its location.
 
 #include <cstddef>
+#include <filesystem>
 #include <map>
 #include <set>
 #include <stdexcept>
@@ -48,6 +49,10 @@ class Findings {
   /// Adds a parameter that does not change the picture; owner is its element. All of them become one note.
   void noteWithoutEffect(const std::string& owner, const std::string& parameter);
 
+  /// Adds a file that the scene names, so that no output replaces it.
+  void addFile(const std::filesystem::path& path) { files_.insert(path); }
+
+  std::vector<std::filesystem::path> files() const { return {files_.begin(), files_.end()}; }
   const std::vector<Fault>& faults() const { return faults_; }
   std::vector<std::string> warnings() const;
   std::vector<std::string> notes() const;
@@ -63,6 +68,7 @@ class Findings {
   };
   std::map<std::string, std::size_t> faultOfKind_, warningOfKind_;  // indices
   std::set<std::string> places_;                                    // locations of faults with their kinds
+  std::set<std::filesystem::path> files_;
   std::vector<Fault> faults_;
   std::vector<Warning> warnings_;
   std::vector<std::string> notes_;

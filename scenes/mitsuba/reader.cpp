@@ -137,6 +137,7 @@ Scene readScene(const std::filesystem::path& path, const ReadOptions& options) {
   scene.warnings = findings.warnings();
   for (const Fault& fault : findings.faults()) scene.warnings.push_back(asWarning(fault));
   scene.notes = findings.notes();
+  scene.files = findings.files();
   return scene;
 }
 

@@ -50,7 +50,10 @@ std::filesystem::path ObjMaterialReader::resolve(const Place& place, std::string
   std::ranges::replace(name, '\\', '/');
   const std::filesystem::path bare = std::filesystem::path(name).filename();
   for (const std::filesystem::path& candidate : {std::filesystem::path(name), bare}) {
-    if (isThere(place.folder / candidate)) return place.folder / candidate;
+    if (isThere(place.folder / candidate)) {
+      context_.findings.addFile(place.folder / candidate);
+      return place.folder / candidate;
+    }
     std::filesystem::path elsewhere = context_.file.resolve(candidate.string(), place.location);
     if (isThere(elsewhere)) return elsewhere;
   }

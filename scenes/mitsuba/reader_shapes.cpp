@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "runtime/core/parallel.h"
+#include "scenes/meshes/duplicates.h"
 #include "scenes/meshes/primitives.h"
 #include "scenes/mitsuba/emission.h"
 #include "scenes/mitsuba/reader_parameters.h"
@@ -275,6 +276,17 @@ void ShapeReader::readMeshes() {
     const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry);
     return mesh && mesh->triangles.empty();
   });
+  for (Shape& shape : context_.scene.shapes)
+    if (shape.emitter) dropDuplicates(shape);
+}
+
+/// A ray hits only one of several equal triangles, but each would be sampled as a light source of its own.
+void ShapeReader::dropDuplicates(Shape& shape) {
+  auto* mesh = std::get_if<TriangleMesh>(&shape.geometry);
+  if (!mesh) return;
+  if (const std::size_t count = removeDuplicateTriangles(*mesh); count > 0)
+    context_.note(fmt::format("emitting shape \"{}\": {} triangles are equal to others of it, and are left out",
+                              shape.name, count));
 }
 
 void ShapeReader::read(Mesh& mesh) {

@@ -58,6 +58,7 @@ class ShapeReader {
   void reportFault(const Mesh& mesh);
   /// Reports a fault for each instance whose group is too far away, and clears the instance.
   void clearInstancesOutOfRange();
+  void dropDuplicates(Shape& shape);
   void dropEmpty(const Mesh& mesh);
 
   ReadContext& context_;

@@ -326,6 +326,12 @@ void SceneFile::indexAliases() {
 }
 
 std::filesystem::path SceneFile::resolve(const std::string& name, std::ptrdiff_t location) const {
+  std::filesystem::path path = find(name, location);
+  findings_.addFile(path);
+  return path;
+}
+
+std::filesystem::path SceneFile::find(const std::string& name, std::ptrdiff_t location) const {
   std::vector<std::filesystem::path> folders(folders_.rbegin(), folders_.rend());
   folders.push_back(files_[0].path.parent_path());
   for (const std::filesystem::path& folder : folders)

@@ -79,6 +79,7 @@ class SceneFile {
     TextRange range;
   };
 
+  std::filesystem::path find(const std::string& name, std::ptrdiff_t location) const;
   void fault(pugi::xml_node node, const std::string& message, const std::string& consequence);
   void parse();
   void checkDepth() const;

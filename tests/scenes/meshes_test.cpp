@@ -233,3 +233,27 @@ TEST_CASE("scenes: objects that are too far away are rejected with their locatio
              Contains("test.xml:2:61: ") && Contains(limit));
   CHECK(faultOf(group + instance + "1e-30\"/></transform></shape>") == "");
 }
+
+TEST_CASE("scenes: equal triangles of an emitter are one light, with a note") {
+  const ObjScene scene("", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 2 3 1\nf 3 2 1\n");
+  const auto triangles = [](const Scene& s) {
+    return std::get<TriangleMesh>(s.shapes.at(0).geometry).triangles.size();
+  };
+  const Scene dark = scene.read();
+  CHECK(triangles(dark) == 3);
+  CHECK(dark.notes.empty());
+  const Scene bright = scene.read("<emitter type=\"area\"><rgb name=\"radiance\" value=\"1\"/></emitter>");
+  CHECK(triangles(bright) == 2);
+  REQUIRE(bright.notes.size() == 1);
+  CHECK_THAT(bright.notes[0], Contains("1 triangles are equal"));
+}
+
+TEST_CASE("scenes: all files that a scene names are known") {
+  const ObjScene scene("newmtl red\nKd 1 0 0\nmap_Kd red.tga\n");
+  scene.folder.write("red.tga", std::string("\0\0\2\0\0\0\0\0\0\0\0\0\1\0\1\0\x18\0rgb", 21));
+  scene.folder.write("part.xml", "<scene version=\"0.6.0\"/>");
+  const Scene read = readScene(scene.folder.write(
+      "test.xml", "<scene version=\"0.6.0\"><include filename=\"part.xml\"/>" + sceneOfObj("").substr(23)));
+  for (const char* name : {"a.obj", "colours.mtl", "red.tga", "part.xml"})
+    CHECK(std::ranges::count(read.files, scene.folder.path() / name) == 1);
+}
