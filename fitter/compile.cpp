@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <tbb/task.h>
 
 #include "fitter/adaptive_fit.h"
 #include "fitter/cache_mixture.h"
@@ -147,10 +148,17 @@ FittedRecord fitOfChain(const Lobe& lobe, const Vec3& wo, GridKind kind, const s
       fitter, settings, neighbour ? fitFromNeighbour(fitter, wo, kind, *neighbour, settings) : fitter.fit(settings));
 }
 
+/// Ends a chain early if its loop has been cancelled, because a chain may take many seconds.
+void throwIfCancelled() {
+  tbb::task_group_context* context = tbb::task::current_context();
+  if (context && context->is_group_execution_cancelled()) throw LoopCancelled();
+}
+
 void fitChain(const Lobe& lobe, const DirectionGrid& grid, const std::vector<int>& chain, const FitSettings& settings,
               std::vector<FittedRecord>& fitted, const std::function<void()>& advance) {
   std::optional<Neighbour> neighbour;
   for (const int entry : chain) {
+    throwIfCancelled();
     const Vec3 wo = grid.direction(entry);
     FittedRecord& record = fitted[static_cast<std::size_t>(entry)];
     record = fitOfChain(lobe, wo, grid.kind, neighbour, settings);

@@ -3,7 +3,9 @@
 
 #include <stdexcept>
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 #include <tbb/parallel_sort.h>
 #include <tbb/task_group.h>
 
@@ -32,6 +34,25 @@ template <class Range, class Less>
 void parallelSort(Range& range, const Less& less) {
   tbb::parallel_sort(range.begin(), range.end(), less);
   if (tbb::is_current_task_group_canceling()) throw LoopCancelled();
+}
+
+/// The same as parallelFor, with one task for each iteration, for iterations that take long.
+template <class Index, class Body>
+void parallelForEach(Index begin, Index end, const Body& body) {
+  tbb::task_group_context context;
+  const auto run = [&](const tbb::blocked_range<Index>& range) {
+    for (Index i = range.begin(); i != range.end(); ++i) body(i);
+  };
+  tbb::parallel_for(tbb::blocked_range<Index>(begin, end, 1), run, tbb::simple_partitioner(), context);
+  if (context.is_group_execution_cancelled()) throw LoopCancelled();
+}
+
+/// Calls the functions in parallel. Throws like parallelFor.
+template <class... Functions>
+void parallelInvoke(const Functions&... functions) {
+  tbb::task_group_context context;
+  tbb::parallel_invoke(functions..., context);
+  if (context.is_group_execution_cancelled()) throw LoopCancelled();
 }
 
 }  // namespace lobe

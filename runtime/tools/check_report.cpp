@@ -6,6 +6,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "runtime/tools/json_text.h"
+
 namespace lobe {
 namespace {
 
@@ -24,8 +26,7 @@ void printJson(const std::filesystem::path& scene, const SceneCheck& check, std:
                                     {"faults", faults},
                                     {"warnings", check.warnings},
                                     {"notes", check.notes}};
-  // Names in scene files may be invalid UTF-8.
-  fmt::print(out, "{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  fmt::print(out, "{}\n", jsonText(json));
 }
 
 void printLines(const std::filesystem::path& scene, const SceneCheck& check, std::FILE* out) {

@@ -13,6 +13,7 @@
 #include "runtime/image/error_metrics.h"
 #include "runtime/image/image_output.h"
 #include "runtime/image/merge.h"
+#include "runtime/tools/json_text.h"
 #include "runtime/tools/tool.h"
 
 namespace {
@@ -66,14 +67,12 @@ std::vector<std::filesystem::path> all(const Arguments& arguments) {
 void checkMerge(const Arguments& arguments) {
   if (std::filesystem::path(arguments.merge).extension() != ".exr")
     throw lobe::UsageError("--merge must name an .exr file, because it stores the number of samples");
-  for (const auto& path : all(arguments))
-    if (std::filesystem::weakly_canonical(path) == std::filesystem::weakly_canonical(arguments.merge))
-      throw lobe::UsageError(
-          fmt::format("{}: is both an input and the output, and would be overwritten", arguments.merge));
 }
 
 void checkArguments(const Arguments& arguments) {
   if (!arguments.merge.empty()) checkMerge(arguments);
+  for (const std::filesystem::path output : {arguments.merge, arguments.map})
+    if (!output.empty()) lobe::checkNotRead(output, all(arguments));
   if (arguments.map.empty()) return;
   if (arguments.images.size() > 1) throw lobe::UsageError("--map takes one image, but several are given");
   if (std::filesystem::path(arguments.map).extension() != ".png") throw lobe::UsageError("--map must name a .png file");
@@ -104,7 +103,7 @@ void printJson(const std::vector<Comparison>& comparisons) {
                      {"relmse_drop_1pct", m.relmseDrop1},
                      {"mean_ratio", m.meanRatio},
                      {"nonfinite", m.nonfinite}});
-  fmt::print("{}\n", array.dump(2));
+  fmt::print("{}\n", lobe::jsonText(array));
 }
 
 void printTable(const std::vector<Comparison>& comparisons) {

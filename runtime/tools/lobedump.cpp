@@ -10,16 +10,12 @@
 #include "runtime/tools/cache_plot.h"
 #include "runtime/tools/cache_report.h"
 #include "runtime/tools/illumination_report.h"
+#include "runtime/tools/json_text.h"
 #include "runtime/tools/tool.h"
 #include "scenes/mitsuba/reader.h"
 #include "scenes/scene_lobes.h"
 
 namespace {
-
-/// Strings of damaged files may be invalid UTF-8.
-std::string dumped(const nlohmann::ordered_json& json) {
-  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
-}
 
 using namespace lobe;
 
@@ -90,6 +86,8 @@ void validate(const Options& o) {
     if (std::filesystem::path(o.points).extension() != ".ply")
       throw UsageError(fmt::format("--points {}: must be a .ply file", o.points));
   }
+  for (const std::string& output : {o.points, o.plot})
+    if (!output.empty()) checkNotRead(output, {o.files.front(), o.scene});
   if (o.plot.empty()) return;
   if (o.files.size() != 1) throw UsageError("--plot needs exactly one cache file");
   if (std::filesystem::path(o.plot).extension() != ".png")
@@ -101,7 +99,7 @@ void validate(const Options& o) {
 void printJson(const std::vector<LobeCache>& caches, const Options& o) {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (std::size_t i = 0; i < caches.size(); ++i) json.push_back(toJson(caches[i], o.files[i]));
-  fmt::print("{}\n", dumped(json));
+  fmt::print("{}\n", jsonText(json));
 }
 
 void printText(const std::vector<LobeCache>& caches, const Options& o) {
@@ -121,7 +119,7 @@ bool runDiff(const LobeCache& a, const LobeCache& b, const Options& o) {
   const CacheDifference difference = compareCaches(a, b);
   const CachePair caches{a, b, o.files[0], o.files[1]};
   if (o.json)
-    fmt::print("{}\n", dumped(toJson(difference, caches)));
+    fmt::print("{}\n", jsonText(toJson(difference, caches)));
   else
     printDifference(difference, caches, stdout);
   return difference.equal;
@@ -133,7 +131,9 @@ LobePtr findLobe(const LobeCache& cache, Options& o) {
   o.read.geometry = false;
   // Parts of the scene that the reader does not support cannot contain the lobe.
   o.read.lenient = true;
-  const std::vector<LobeUse> uses = collectLobes(readScene(o.scene, o.read));
+  const Scene scene = readScene(o.scene, o.read);
+  checkNotRead(o.plot, scene.files);
+  const std::vector<LobeUse> uses = collectLobes(scene);
   const auto found = std::ranges::find_if(uses, [&](const LobeUse& u) { return u.lobe->key() == cache.info().key; });
   if (found == uses.end())
     throw std::runtime_error(
@@ -217,7 +217,7 @@ void runIllumination(const Options& o) {
     printIllumination(files[i], o.files[i], stdout);
     if (o.records) printRecords(files[i], stdout);
   }
-  if (o.json) fmt::print("{}\n", dumped(json));
+  if (o.json) fmt::print("{}\n", jsonText(json));
 }
 
 /// Returns false if --diff found a difference.

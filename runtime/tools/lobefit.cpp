@@ -1,6 +1,7 @@
 // lobefit SCENE.xml [-o DIR]: compiles the glossy lobes of a scene's materials into cache files.
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <exception>
 #include <iterator>
@@ -14,6 +15,7 @@
 #include "runtime/core/parallel.h"
 #include "runtime/tools/cache_report.h"
 #include "runtime/tools/check_report.h"
+#include "runtime/tools/json_text.h"
 #include "runtime/tools/tool.h"
 #include "scenes/mitsuba/reader.h"
 #include "scenes/scene_lobes.h"
@@ -116,25 +118,41 @@ CacheReport compileOne(const CompileJob& job, Progress& progress) {
   throw std::runtime_error(line);
 }
 
-std::vector<CacheReport> compileAll(const std::vector<CompileJob>& jobs) {
+/// Returns whether the job's cache is complete. A failure is stored in fault.
+bool attempt(const CompileJob& job, Progress& progress, CacheReport& report, std::string& fault) {
+  try {
+    report = compileOne(job, progress);
+    return true;
+  } catch (const std::exception& error) {
+    fault = error.what();
+    return false;
+  }
+}
+
+std::vector<CacheReport> compileAll(const std::vector<CompileJob>& jobs, const StopFlag& stop) {
   double directions = 0;
   for (const CompileJob& job : jobs) {
     if (!job.upToDate) directions += workOf(job);
     if (!job.stale.empty())
-      fmt::print(stderr, "lobefit: {} is fitted again: {}\n", job.path.string(), withoutPath(job.stale, job.path));
+      printDiagnostic(
+          fmt::format("lobefit: {} is fitted again: {}\n", job.path.string(), withoutPath(job.stale, job.path)));
   }
   Progress progress("fitting", directions);
   std::vector<CacheReport> reports(jobs.size());
   std::vector<std::string> faultOf(jobs.size());
   // Lobes are fitted in parallel as well, because the first few directions of each lobe leave cores idle. An exception
   // would cancel the other lobes, so the message of each is stored.
-  parallelFor(std::size_t{0}, jobs.size(), [&](std::size_t i) {
-    try {
-      reports[i] = compileOne(jobs[i], progress);
-    } catch (const std::exception& error) {
-      faultOf[i] = error.what();
-    }
-  });
+  std::atomic<std::size_t> complete = static_cast<std::size_t>(std::ranges::count_if(jobs, &CompileJob::upToDate));
+  try {
+    stoppable(stop, "", [&] {
+      parallelFor(std::size_t{0}, jobs.size(), [&](std::size_t i) {
+        if (attempt(jobs[i], progress, reports[i], faultOf[i]) && !jobs[i].upToDate) ++complete;
+      });
+    });
+  } catch (const Stopped&) {
+    throw Stopped(
+        fmt::format("{} of {} caches are complete; the same command fits the others", complete.load(), jobs.size()));
+  }
   std::vector<std::string> faults;
   std::ranges::copy_if(faultOf, std::back_inserter(faults), [](const std::string& fault) { return !fault.empty(); });
   if (!faults.empty()) failWith(faults, jobs.size());
@@ -145,7 +163,7 @@ void printResult(const std::vector<CacheReport>& reports, const Options& o) {
   if (o.json) {
     nlohmann::ordered_json json = nlohmann::ordered_json::array();
     for (const CacheReport& r : reports) json.push_back(toJson(r));
-    fmt::print("{}\n", json.dump(2));
+    fmt::print("{}\n", jsonText(json));
     return;
   }
   if (!reports.empty()) printReports(reports, true, stdout);
@@ -153,13 +171,13 @@ void printResult(const std::vector<CacheReport>& reports, const Options& o) {
 
 void reportSummary(const std::vector<CacheReport>& reports, const Options& o) {
   const auto fresh = std::ranges::count_if(reports, [](const CacheReport& r) { return !r.upToDate; });
+  std::string line = fmt::format("{} of {} lobes written to {}", fresh, reports.size(), o.compile.directory.string());
   if (reports.empty())
-    fmt::print(stderr, "lobefit: nothing to do: no material of {} has a glossy lobe to fit\n", o.scene);
+    line = fmt::format("nothing to do: no material of {} has a glossy lobe to fit", o.scene);
   else if (fresh == 0)
-    fmt::print(stderr, "lobefit: nothing to do: all {} lobes in {} are up to date\n", reports.size(),
-               o.compile.directory.string());
-  else
-    fmt::print(stderr, "lobefit: {} of {} lobes written to {}\n", fresh, reports.size(), o.compile.directory.string());
+    line =
+        fmt::format("nothing to do: all {} lobes in {} are up to date", reports.size(), o.compile.directory.string());
+  printDiagnostic(fmt::format("lobefit: {}\n", line));
 }
 
 /// Tells the user which lobes miss the quality target.
@@ -186,10 +204,11 @@ void run(Options& o) {
   if (o.threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(o.threads));
   o.read.geometry = false;
   if (o.check) return reportCheck(o.scene, o.read, o.json, stdout);
+  const StopFlag& stop = stopOnSignals();
   const Scene scene = readScene(o.scene, o.read);
   for (const std::string& note : scene.notes) printNote("lobefit", note);
   for (const std::string& warning : scene.warnings) printWarning("lobefit", warning);
-  const std::vector<CacheReport> reports = compileAll(planCompile(collectLobes(scene), o.compile));
+  const std::vector<CacheReport> reports = compileAll(planCompile(collectLobes(scene), o.compile), stop);
   reportSummary(reports, o);
   reportMissedQuality(reports, o);
   printResult(reports, o);

@@ -1,10 +1,8 @@
 // loberender: trains the illumination of a scene and renders it.
 
-#include <algorithm>
 #include <cstdint>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <oneapi/tbb/global_control.h>
 
 #include "runtime/tools/check_report.h"
@@ -27,8 +25,17 @@ std::pair<int, int> parsePair(const std::string& option, const std::string& text
 
 constexpr std::uint64_t kMaxSeed = std::uint64_t{1} << 53;  // the metadata of a picture stores it exactly
 
-const std::vector<std::string> kIntegratorNames{"auto", "path", "guided", "product"};  // in the order of IntegratorKind
-const std::vector<std::string> kFractionsNames{"fixed", "learnt"};
+template <class Enumeration>
+using Names = std::vector<std::pair<std::string, Enumeration>>;
+
+const Names<IntegratorKind> kIntegratorNames{{"auto", IntegratorKind::automatic},
+                                             {"path", IntegratorKind::path},
+                                             {"guided", IntegratorKind::guided},
+                                             {"product", IntegratorKind::product}};
+const Names<RussianRoulette> kRussianRouletteNames{{"throughput", RussianRoulette::throughput},
+                                                   {"efficiency", RussianRoulette::efficiency}};
+const Names<PixelSampling> kSamplerNames{{"sobol", PixelSampling::sobol}, {"independent", PixelSampling::independent}};
+const Names<bool> kFractionsNames{{"fixed", false}, {"learnt", true}};
 
 // The old names are accepted in version 0.2 only.
 const std::vector<RenamedOption> kRenamedOptions{
@@ -38,7 +45,7 @@ const std::vector<RenamedOption> kRenamedOptions{
 
 struct Options {
   RenderJob job;
-  std::string size, record, integrator = "auto", fractions = "learnt";
+  std::string size, record;
   int threads = 0;
   bool check = false, json = false;
   std::vector<const CLI::Option*> guidedOnly;  ///< rendering options that path tracing ignores
@@ -51,7 +58,7 @@ void declareTraining(CLI::App& app, Options& options) {
   app.option_defaults()->group("Training");
   TrainingPlan& plan = job.training;
   app.add_option("--train", plan.from, "Source of the training samples: photons, camera paths or both")
-      ->transform(CLI::CheckedTransformer(trainFromNames()).description("{photons,paths,both}"))
+      ->transform(oneOf(trainFromNames()))
       ->default_str("both");
   app.add_option("--passes", job.passes,
                  "Number of training passes (default: 8, or unlimited if the training time is limited)");
@@ -64,10 +71,10 @@ void declareTraining(CLI::App& app, Options& options) {
   app.add_option("--components", plan.records.components, "Number of Gaussians per illumination record")
       ->check(CLI::Range(1, FieldOptions::kMostComponents))
       ->capture_default_str();
-  app.add_option("--bsdf-fraction", options.fractions,
+  app.add_option("--bsdf-fraction", plan.learnFractions,
                  "BSDF sampling fraction of the product integrator: learnt for each record, or fixed")
-      ->check(CLI::IsMember(kFractionsNames))
-      ->capture_default_str();
+      ->transform(oneOf(kFractionsNames))
+      ->default_str("learnt");
   app.add_option("--train-seconds", job.trainSeconds,
                  "Approximate time limit for training in seconds (default: 15 % of --seconds, or no limit with --spp)");
   const auto ofTraining = [&app] {
@@ -96,12 +103,11 @@ void declare(CLI::App& app, Options& options) {
   app.add_option("--cache", job.cacheFolder, "Folder of the BRDF caches made by lobefit")
       ->type_name("DIR")
       ->capture_default_str();
-  app.add_option("--integrator", options.integrator,
+  app.add_option("--integrator", job.integrator,
                  "Integrator: path (BSDF sampling), guided (illumination and BSDF), product (BRDF times illumination), "
-                 "or auto: path "
-                 "or product, whichever has the lower error in a short comparison after training")
-      ->check(CLI::IsMember(kIntegratorNames))
-      ->capture_default_str();
+                 "or auto: path or product, whichever has the lower error in a short comparison after training")
+      ->transform(oneOf(kIntegratorNames))
+      ->default_str("auto");
   app.add_option("--spp", job.samples, "Number of samples per pixel");
   app.add_option("--sample-offset", job.sampleOffset,
                  "Index of the first sample, to render parts of a picture for lobecompare --merge")
@@ -118,20 +124,14 @@ void declare(CLI::App& app, Options& options) {
   app.add_option(
          "--russian-roulette", job.russianRoulette,
          "Russian roulette by throughput, or efficiency-aware Russian roulette and splitting (guided and product)")
-      ->transform(
-          CLI::CheckedTransformer(std::map<std::string, RussianRoulette>{{"throughput", RussianRoulette::throughput},
-                                                                         {"efficiency", RussianRoulette::efficiency}})
-              .description("{throughput,efficiency}"))
+      ->transform(oneOf(kRussianRouletteNames))
       ->default_str("efficiency");
   app.add_option("--shadow-surfaces", job.shadowSurfaces,
                  "Number of glass, mask or null surfaces that next-event estimation sees through (0: none)")
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();
   app.add_option("--sampler", job.sampling, "Random numbers of a pixel: Owen-scrambled Sobol' points, or independent")
-      ->transform(
-          CLI::CheckedTransformer(std::map<std::string, PixelSampling>{{"sobol", PixelSampling::sobol},
-                                                                       {"independent", PixelSampling::independent}})
-              .description("{sobol,independent}"))
+      ->transform(oneOf(kSamplerNames))
       ->default_str("sobol");
   app.add_option("--seed", job.seed, "Random seed")
       ->check(CLI::Range(std::uint64_t{0}, kMaxSeed))
@@ -139,6 +139,15 @@ void declare(CLI::App& app, Options& options) {
   app.add_option("--reference", job.reference, "Reference picture for --convergence")->type_name("FILE");
   app.add_option("--convergence", job.convergence, "Write the error against --reference over time to this CSV file")
       ->type_name("OUT.csv");
+  app.add_option("--snapshot-every", job.snapshotEvery,
+                 "Write the outputs as they are every so many seconds while rendering; 0: only at the end (default: "
+                 "60 with --checkpoint and in runs of over 2 minutes, or 0)")
+      ->type_name("SECONDS");
+  app.add_option("--checkpoint", job.checkpoint,
+                 "Write the state of the run to this file with every snapshot and when it is interrupted")
+      ->type_name("FILE");
+  app.add_option("--resume", job.resume, "Continue the run that wrote this checkpoint; give the same options again")
+      ->type_name("FILE");
   app.add_option("--stats", job.stats, "Write statistics of the run to this JSON file")->type_name("OUT.json");
   auto* record =
       app.add_option("--record", options.record,
@@ -163,31 +172,29 @@ void declare(CLI::App& app, Options& options) {
 
 /// Options that the integrator ignores are not errors, so that a script can pass the same options to all integrators.
 void noteUnused(const Options& options) {
+  const IntegratorKind integrator = options.job.integrator;
   std::vector<std::string> unused;
   for (const CLI::Option* option : options.training) {
-    const bool used = options.integrator == "product" || options.integrator == "auto" ||
-                      (options.integrator == "guided" && option->get_name() != "--bsdf-fraction");
+    const bool used = integrator == IntegratorKind::product || integrator == IntegratorKind::automatic ||
+                      (integrator == IntegratorKind::guided && option->get_name() != "--bsdf-fraction");
     if (option->count() > 0 && !used) unused.push_back(option->get_name());
   }
-  if (options.integrator == "path")
+  if (integrator == IntegratorKind::path)
     for (const CLI::Option* option : options.guidedOnly)
       if (option->count() > 0) unused.push_back(option->get_name());
   if (!unused.empty())
-    printNote("loberender", fmt::format("--integrator {} ignores {}", options.integrator, fmt::join(unused, ", ")));
+    printNote("loberender", fmt::format("--integrator {} ignores {}", nameOf(integrator), fmt::join(unused, ", ")));
 }
 
 void work(Options& options) {
   if (options.check)
     return reportCheck(options.job.scene, {options.job.definitions, options.job.lenient}, options.json, stdout);
-  const auto name = std::ranges::find(kIntegratorNames, options.integrator);
-  options.job.integrator = static_cast<IntegratorKind>(name - kIntegratorNames.begin());
-  options.job.training.learnFractions = options.fractions == "learnt";
   if (!options.size.empty()) options.job.size = parsePair("--size", options.size, 'x', "WIDTHxHEIGHT");
   if (!options.record.empty()) options.job.record = parsePair("--record", options.record, ',', "X,Y");
   noteUnused(options);
   std::optional<oneapi::tbb::global_control> limit;
   if (options.threads > 0) limit.emplace(oneapi::tbb::global_control::max_allowed_parallelism, options.threads);
-  run(options.job);
+  run(options.job, stopOnSignals());
 }
 
 }  // namespace

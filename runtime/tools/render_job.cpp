@@ -6,9 +6,10 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
+#include <functional>
 #include <limits>
 #include <memory>
+#include <new>
 #include <numeric>
 #include <stdexcept>
 
@@ -28,6 +29,8 @@
 #include "runtime/render/integrators/pilot.h"
 #include "runtime/render/integrators/renderer.h"
 #include "runtime/render/training/light_learning.h"
+#include "runtime/tools/checkpoint.h"
+#include "runtime/tools/json_text.h"
 #include "runtime/tools/stored_illumination.h"
 #include "runtime/tools/tool.h"
 #include "scenes/camera.h"
@@ -43,9 +46,9 @@ constexpr const char* kTool = "loberender";
 constexpr double kTrainingFraction = 0.15;
 constexpr std::int64_t kMaxPixels = 1 << 28;  // larger sizes are assumed to be typing errors
 
-const char* nameOf(IntegratorKind kind) {
-  constexpr std::array names{"auto", "path", "guided", "product"};
-  return names[static_cast<std::size_t>(kind)];
+/// Whether the integrator may sample the product.
+bool mayUseProduct(IntegratorKind kind) {
+  return kind == IntegratorKind::product || kind == IntegratorKind::automatic;
 }
 
 /// Quotes the word for the shell if necessary.
@@ -62,21 +65,55 @@ std::filesystem::path placeOf(const std::filesystem::path& path) {
   return std::filesystem::weakly_canonical(std::filesystem::absolute(path));
 }
 
-/// Checks before the work starts that all output files can be written and are distinct from each other and from the
-/// inputs.
-void checkFiles(const RenderJob& job) {
+std::vector<std::filesystem::path> writtenBy(const RenderJob& job) {
   std::vector<std::filesystem::path> written = job.outputs;
-  for (const auto& path : {job.convergence, job.stats, job.saveIllumination})
+  for (const auto& path : {job.convergence, job.stats, job.saveIllumination, job.checkpoint})
     if (!path.empty()) written.push_back(path);
   if (job.record) written.push_back(job.recordImage);
+  return written;
+}
+
+/// Checks before the work starts that all output files can be written and are distinct from each other and from the
+/// inputs. The checkpoint that a run continues may be replaced by its own.
+void checkFiles(const RenderJob& job) {
+  const std::vector<std::filesystem::path> written = writtenBy(job);
   std::map<std::filesystem::path, int> uses;
   for (const auto& path : {job.scene, job.reference, job.illumination})
     if (!path.empty()) ++uses[placeOf(path)];
+  if (!job.resume.empty() && (job.checkpoint.empty() || placeOf(job.resume) != placeOf(job.checkpoint)))
+    ++uses[placeOf(job.resume)];
   for (const auto& path : written)
     if (++uses[placeOf(path)] > 1)
       throw UsageError(fmt::format("{}: is used for more than one file, and would be overwritten", path.string()));
   for (const auto& path : written) checkWritable(path);
 }
+
+/// Checks that no output replaces a file of the scene or a BRDF cache.
+void checkSceneFiles(const RenderJob& job, const Scene& scene) {
+  std::vector<std::filesystem::path> read = scene.files;
+  if (mayUseProduct(job.integrator))
+    for (const LobeRequest& request : lobeRequests(scene))
+      read.push_back(job.cacheFolder / lobeFileName(request.model, request.key));
+  for (const auto& path : writtenBy(job)) checkNotRead(path, read);
+}
+
+/// Collects the errors of outputs, so that one that fails does not prevent the others.
+class OutputErrors {
+ public:
+  void attempt(const std::filesystem::path& path, const std::function<void()>& write) {
+    try {
+      write();
+    } catch (const std::bad_alloc&) {
+      errors_.push_back(path.string() + ": not enough memory");
+    } catch (const std::exception& e) {
+      errors_.emplace_back(e.what());
+    }
+  }
+  const std::vector<std::string>& all() const { return errors_; }
+
+ private:
+  std::vector<std::string> errors_;
+};
 
 double peakResidentBytes() {
   rusage usage{};
@@ -173,11 +210,11 @@ struct Guiding {
   }
 };
 
-/// Results of a run other than the picture.
+/// Results of a run, or of the part so far.
 struct RunResult {
   RenderResult render;
   const Guiding& guiding;
-  std::uint64_t dropped;
+  const Film& film;
 
   const TrainingReport& training() const { return guiding.training.report; }
   IntegratorKind integrator(const RenderJob& job) const {
@@ -254,35 +291,73 @@ nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, c
           {"lobe_bytes", run.guiding.caches ? run.guiding.caches->bytes() : 0},
           {"strategy_fractions", fractionsOf(paths.strategies, kScatteringNames)},
           {"guiding_decisions", fractionsOf(paths.decisions, kGuidingDecisionNames)},
-          {"nonfinite_samples", run.dropped}};
+          {"nonfinite_samples", run.film.dropped()}};
 }
 
 ImageAttributes attributes(const RenderJob& job, std::uint64_t sceneHash, const RunResult& run) {
   ImageAttributes all{{"software", fmt::format("Lobe {}", LOBE_VERSION)},
                       {"integrator", std::string(nameOf(run.integrator(job)))},
                       {"seed", static_cast<double>(job.seed)},
-                      {"samples", static_cast<double>(run.render.total.samples)},
                       {"sampleOffset", static_cast<double>(job.sampleOffset)},
                       {"sceneHash", fmt::format("{:016x}", sceneHash)}};
+  const auto [least, most] = run.film.sampleRange();
+  if (least == most)
+    all["samples"] = static_cast<double>(least);
+  else  // without "samples", so that such a picture is not merged as if all pixels had equally many
+    all["interrupted"] = fmt::format("{} to {} samples per pixel", least, most);
   if (run.guiding.caches) all["cacheHashes"] = fmt::format("{:016x}", fmt::join(run.guiding.caches->hashes(), " "));
   // Only written for --seconds, because pictures rendered with --spp must be byte-identical on every run.
   if (job.seconds) all["seconds"] = run.seconds();
   return all;
 }
 
-void train(const RenderJob& job, const RenderScene& scene, const RayCamera& camera, Guiding& guiding) {
+TrainingPlan planOf(const RenderJob& job) {
   TrainingPlan plan = job.training;
   plan.seed = job.seed;
   plan.keepParticles = job.record.has_value();
   plan.seconds = job.trainSeconds.value_or(job.seconds ? kTrainingFraction * *job.seconds : kInfinity);
   // If the time is limited and --passes is not given, only the time limits the number of passes.
   plan.passes = job.passes.value_or(plan.seconds < kInfinity ? std::numeric_limits<int>::max() : plan.passes);
+  return plan;
+}
+
+void train(const TrainingPlan& plan, const RenderScene& scene, const RayCamera& camera, Guiding& guiding) {
   const bool timed = plan.seconds < kInfinity;
   Progress progress("training", timed ? plan.seconds : plan.passes);
   guiding.training = trainIllumination(scene, camera, guiding.cachesOrNull(), plan,
                                        [&](const PassReport& pass) { progress.advance(timed ? pass.seconds : 1.0); });
-  if (!job.saveIllumination.empty())
-    saveIllumination(job.saveIllumination, guiding.training, plan, scene.scene, job.scene);
+}
+
+/// Everything that determines the samples of a picture, except for their number and time limits of training.
+RunSettings settingsOf(const RenderJob& job, const Scene& scene, const Guiding& guiding,
+                       const std::optional<IlluminationFile>& stored) {
+  const FilmCrop picture = scene.camera.picture();
+  RunSettings all{{"the version of Lobe", LOBE_VERSION},
+                  {"--integrator", nameOf(job.integrator)},
+                  {"the size", fmt::format("{}x{}", picture.width, picture.height)},
+                  {"--seed", std::to_string(job.seed)},
+                  {"--sampler", job.sampling == PixelSampling::sobol ? "sobol" : "independent"},
+                  {"--sample-offset", std::to_string(job.sampleOffset)},
+                  {"--max-depth", job.maxDepth ? std::to_string(*job.maxDepth) : "that of the scene"},
+                  {"--shadow-surfaces", std::to_string(job.shadowSurfaces)},
+                  {"the hash of scene and camera", fmt::format("{:016x}", pictureHash(scene))}};
+  if (job.integrator == IntegratorKind::path) return all;
+  const TrainingPlan& plan = job.training;
+  const auto names = trainFromNames();
+  const auto from = std::ranges::find(names, plan.from, [](const auto& entry) { return entry.second; });
+  all.emplace_back("--reduction", fmt::format("{}", job.reduction));
+  all.emplace_back("--russian-roulette",
+                   job.russianRoulette == RussianRoulette::efficiency ? "efficiency" : "throughput");
+  all.emplace_back("the hash of --illumination", stored ? fmt::format("{:016x}", stored->header().hash) : "none");
+  all.emplace_back("--train", from->first);
+  all.emplace_back("--passes", job.passes ? std::to_string(*job.passes) : "the default");
+  all.emplace_back("--photons", std::to_string(plan.photons));
+  all.emplace_back("--importons", std::to_string(plan.importons));
+  all.emplace_back("--components", std::to_string(plan.records.components));
+  all.emplace_back("--bsdf-fraction", plan.learnFractions ? "learnt" : "fixed");
+  if (guiding.caches)
+    all.emplace_back("the hash of the BRDF caches", fmt::format("{:016x}", fmt::join(guiding.caches->hashes(), " ")));
+  return all;
 }
 
 std::string recordFault(const RenderJob& job, const NoRecord& e) {
@@ -356,30 +431,224 @@ std::unique_ptr<Integrator> makeIntegrator(const RenderJob& job, const RenderSce
   return guided;
 }
 
-/// Whether the integrator may sample the product.
-bool mayUseProduct(IntegratorKind kind) {
-  return kind == IntegratorKind::product || kind == IntegratorKind::automatic;
+/// One run, step by step. Cannot be moved, because members refer to others.
+class Run {
+ public:
+  Run(const RenderJob& job, const StopFlag& stop) : job_(job), stop_(stop) {}
+  Run(const Run&) = delete;
+  Run& operator=(const Run&) = delete;
+
+  /// Everything before the first sample. Writes only the plot of a record.
+  void prepare();
+  /// Renders, with snapshots, until the end or until it is stopped.
+  void render();
+  /// Writes the outputs, and throws if one of them cannot be written, or if the run was stopped.
+  void finish();
+
+ private:
+  void readCheckpoint();
+  void readIllumination(const IlluminationFile& file, const std::filesystem::path& path);
+  void makeGuiding();
+  void saveTraining();
+  RenderOptions options() const;
+  double fractionDone() const;
+  bool snapshotIsDue() const;
+  void snapshot();
+  void writeOutputs(OutputErrors& errors) const;
+  void writeCheckpoint(OutputErrors& errors) const;
+  std::string stopMessage() const;
+  double prepared() const { return guiding_.seconds(); }
+
+  const RenderJob& job_;
+  const StopFlag& stop_;
+  LoadTimes load_;
+  std::optional<CheckpointFile> resumed_;
+  std::optional<Scene> scene_;
+  std::optional<RenderScene> renderScene_;
+  std::optional<RayCamera> camera_;
+  std::optional<ConvergenceLog> log_;
+  Guiding guiding_;
+  std::vector<std::byte> illumination_;  ///< for checkpoints and --save-illumination: the content of an .illum file
+  RunSettings settings_;
+  std::unique_ptr<Integrator> integrator_;
+  std::optional<Film> film_;
+  RenderResult result_;
+  OutputErrors errors_;
+  Stopwatch sinceSnapshot_;
+};
+
+void Run::prepare() {
+  if (!job_.resume.empty()) resumed_.emplace(CheckpointFile::open(job_.resume));
+  std::optional<IlluminationFile> stored;
+  if (!job_.illumination.empty()) stored.emplace(IlluminationFile::open(job_.illumination));
+  const Stopwatch reading;
+  scene_.emplace(readFor(job_));
+  load_.reading = reading.seconds();
+  checkSceneFiles(job_, *scene_);
+  log_.emplace(job_, *scene_);
+  if (mayUseProduct(job_.integrator))
+    guiding_.caches.emplace(job_.cacheFolder, lobeRequests(*scene_), lobefitCommand(job_), job_.reduction);
+  settings_ = settingsOf(job_, *scene_, guiding_, stored);
+  if (resumed_)
+    readCheckpoint();
+  else if (stored)
+    readIllumination(*stored, job_.illumination);
+  const Stopwatch building;
+  renderScene_.emplace(*scene_, job_.shadowSurfaces);
+  load_.building = building.seconds();
+  load_.embree = renderScene_->tracer.buildSeconds();
+  camera_.emplace(scene_->camera, scene_->filter);
+  const Stopwatch learning;
+  renderScene_->lights.use(learnLightCells(*renderScene_, *camera_, job_.seed));
+  guiding_.secondsLights = learning.seconds();
+  if (!film_) film_.emplace(camera_->width(), camera_->height());
+  if (!job_.checkpoint.empty() && film_->pixels().size() > kMaxCheckpointPixels)
+    throw std::runtime_error(fmt::format("--checkpoint: a checkpoint holds at most {} pixels", kMaxCheckpointPixels));
+  const std::optional<Receiver> receiver = receiverFor(job_, *renderScene_, *camera_);
+  if (job_.integrator != IntegratorKind::path) makeGuiding();
+  if (receiver) drawRecord(job_, *renderScene_, *receiver, guiding_.training);
+  integrator_ = makeIntegrator(job_, *renderScene_, *camera_, guiding_);
 }
 
-RenderOptions renderOptions(const RenderJob& job, double trained) {
-  RenderOptions options{job.seed, job.samples, std::nullopt, job.sampling, job.sampleOffset};
-  if (job.seconds) options.seconds = std::max(*job.seconds - trained, 1e-3);
+void Run::readCheckpoint() {
+  checkSameRun(*resumed_, job_.resume, settings_);
+  const FilmCrop picture = scene_->camera.picture();
+  film_.emplace(filmOf(*resumed_));
+  if (film_->width() != picture.width || film_->height() != picture.height)
+    throw std::runtime_error(fmt::format("{}: damaged: the film has another size", job_.resume.string()));
+  result_ = resultOf(*resumed_, job_.resume);
+  const auto [least, most] = film_->sampleRange();
+  if (job_.samples && most > static_cast<std::uint32_t>(*job_.samples))
+    throw std::runtime_error(fmt::format("{}: has {} samples per pixel already, more than --spp {}",
+                                         job_.resume.string(), most, *job_.samples));
+  if (job_.integrator != IntegratorKind::path)
+    readIllumination(IlluminationFile::parse(resumed_->illumination(), job_.resume), job_.resume);
+  guiding_.training.report = trainingOf(*resumed_);
+  printNote(kTool, fmt::format("{}: continues with sample {} of each pixel", job_.resume.string(), least + 1));
+}
+
+void Run::readIllumination(const IlluminationFile& file, const std::filesystem::path& path) {
+  const Stopwatch restoring;
+  guiding_.training = restoreIllumination(file, path, *scene_);
+  if (mayUseProduct(job_.integrator) && job_.training.learnFractions && !guiding_.training.report.learntFractions)
+    printNote(kTool, fmt::format("{}: the records have learnt no BSDF sampling fractions (trained by guided, or with "
+                                 "--bsdf-fraction fixed); all use {:.1f}",
+                                 path.string(), kInitialBsdfFraction));
+  load_.restoring = restoring.seconds();
+}
+
+void Run::makeGuiding() {
+  const TrainingPlan plan = planOf(job_);
+  if (!resumed_ && job_.illumination.empty()) train(plan, *renderScene_, *camera_, guiding_);
+  if (!job_.checkpoint.empty() || !job_.saveIllumination.empty())
+    illumination_ = encodeIllumination(guiding_.training, plan, *scene_, job_.scene);
+  guiding_.reduceRecords(job_.reduction);
+  guiding_.sampler.emplace(*scene_, guiding_.training.field, guiding_.cachesOrNull());
+}
+
+/// Writes what a later run would have to train again otherwise. Failures do not prevent rendering.
+void Run::saveTraining() {
+  if (!job_.saveIllumination.empty())
+    errors_.attempt(job_.saveIllumination,
+                    [&] { writeAtomically(job_.saveIllumination, std::span<const std::byte>(illumination_)); });
+  for (const std::string& error : errors_.all()) printWarning(kTool, error + "; rendering goes on");
+  OutputErrors ofCheckpoint;  // it is written again later
+  writeCheckpoint(ofCheckpoint);
+  for (const std::string& error : ofCheckpoint.all()) printWarning(kTool, error);
+}
+
+RenderOptions Run::options() const {
+  RenderOptions options{job_.seed, job_.samples, std::nullopt, job_.sampling, job_.sampleOffset};
+  if (job_.seconds) options.seconds = std::max(*job_.seconds - prepared(), 1e-3);
+  if (const double every = job_.snapshotEvery.value_or(RenderJob::kSnapshotSeconds); every > 0)
+    options.longestWave = every;
+  options.stop = &stop_;
   return options;
 }
 
-RenderResult renderWithProgress(const RenderJob& job, const RayCamera& camera, const Integrator& integrator,
-                                double trained, Film& film, ConvergenceLog& log) {
-  Progress progress("rendering", job.samples ? *job.samples : *job.seconds - trained);
+double Run::fractionDone() const {
+  return job_.samples ? static_cast<double>(result_.total.samples) / *job_.samples
+                      : (prepared() + result_.total.seconds) / *job_.seconds;
+}
+
+bool Run::snapshotIsDue() const {
+  const double every = job_.snapshotEvery.value_or(RenderJob::kSnapshotSeconds);
+  if (every == 0 || sinceSnapshot_.seconds() < every || fractionDone() >= 1) return false;
+  const double expected = (prepared() + result_.total.seconds) / fractionDone();
+  return job_.snapshotEvery || !job_.checkpoint.empty() || expected > RenderJob::kLongRun;
+}
+
+void Run::snapshot() {
+  OutputErrors errors;
+  writeOutputs(errors);
+  for (const std::string& error : errors.all()) printWarning(kTool, error);
+  sinceSnapshot_ = Stopwatch();
+}
+
+void Run::render() {
+  saveTraining();
+  Progress progress("rendering", 1);
   double done = 0;
-  return render(camera, integrator, film, renderOptions(job, trained), [&](const RenderProgress& p) {
-    const double now = job.samples ? p.samples : p.seconds;
-    progress.advance(now - done);
-    done = now;
-    log.add(film, trained + p.seconds, p.samples);
+  sinceSnapshot_ = Stopwatch();
+  result_ = lobe::render(
+      *camera_, *integrator_, *film_, options(),
+      [&](const RenderResult& result) {
+        result_ = result;
+        progress.advance(fractionDone() - done);
+        done = fractionDone();
+        log_->add(*film_, prepared() + result.total.seconds, result.total.samples);
+        if (snapshotIsDue()) snapshot();
+      },
+      result_);
+}
+
+void Run::writeOutputs(OutputErrors& errors) const {
+  const RunResult result{result_, guiding_, *film_};
+  const std::uint64_t hash = pictureHash(*scene_);
+  for (const auto& output : job_.outputs)
+    errors.attempt(output, [&] { writeImage(output, film_->mean(), attributes(job_, hash, result)); });
+  errors.attempt(job_.convergence, [&] { log_->write(); });
+  if (!job_.stats.empty())
+    errors.attempt(job_.stats, [&] { writeAtomically(job_.stats, jsonText(statistics(job_, load_, result)) + "\n"); });
+  writeCheckpoint(errors);
+}
+
+void Run::writeCheckpoint(OutputErrors& errors) const {
+  if (job_.checkpoint.empty()) return;
+  errors.attempt(job_.checkpoint, [&] {
+    const std::vector<std::byte> bytes =
+        encodeCheckpoint(settings_, *film_, result_, guiding_.training.report, illumination_);
+    writeAtomically(job_.checkpoint, std::span<const std::byte>(bytes));
   });
 }
 
+std::string Run::stopMessage() const {
+  const auto [least, most] = film_->sampleRange();
+  std::string message = least == most ? fmt::format("{}", least) : fmt::format("{} to {}", least, most);
+  if (job_.samples) message += fmt::format(" of {}", *job_.samples);
+  message += most > 0 ? " samples per pixel are rendered and written" : " samples per pixel, so no picture is written";
+  if (!job_.checkpoint.empty()) message += fmt::format("; --resume {} goes on", quoted(job_.checkpoint.string()));
+  return message;
+}
+
+void Run::finish() {
+  if (const std::uint64_t dropped = film_->dropped(); dropped > 0)
+    printWarning(kTool, fmt::format("{} samples were negative or not finite, and were discarded", dropped));
+  if (film_->sampleRange().second > 0)
+    writeOutputs(errors_);
+  else
+    writeCheckpoint(errors_);
+  if (result_.stopped && errors_.all().empty()) throw Stopped(stopMessage());
+  if (result_.stopped) printWarning(kTool, "interrupted: " + stopMessage());
+  if (!errors_.all().empty()) throw std::runtime_error(fmt::format("{}", fmt::join(errors_.all(), "\n")));
+}
+
 }  // namespace
+
+const char* nameOf(IntegratorKind kind) {
+  constexpr std::array names{"auto", "path", "guided", "product"};
+  return names[static_cast<std::size_t>(kind)];
+}
 
 void RenderJob::validate() const {
   const auto require = [](bool condition, const std::string& message) {
@@ -409,6 +678,11 @@ void RenderJob::validate() const {
   require(reduction >= 0 && std::isfinite(reduction), "--reduction must be a finite number of at least 0");
   require(!outputs.empty(), "-o FILE is required");
   require(!record || integrator != IntegratorKind::path, "--record requires --integrator auto, guided or product");
+  require(!snapshotEvery || (*snapshotEvery >= 0 && std::isfinite(*snapshotEvery)),
+          "--snapshot-every must be a finite number of at least 0");
+  require(resume.empty() || !record, "--record cannot be combined with --resume, because the particles are not stored");
+  require(resume.empty() || convergence.empty(),
+          "--convergence cannot be combined with --resume, because the earlier errors are not stored");
   require(recordImage.extension() == ".png", "--record-image must name a .png file");
   try {
     training.validate();
@@ -426,54 +700,13 @@ std::string lobefitCommand(const RenderJob& job) {
   return command;
 }
 
-void run(const RenderJob& job) {
+void run(const RenderJob& job, const StopFlag& stop) {
   job.validate();
   checkFiles(job);
-  std::optional<IlluminationFile> stored;
-  if (!job.illumination.empty()) stored.emplace(IlluminationFile::open(job.illumination));
-  LoadTimes load;
-  const Stopwatch reading;
-  const Scene scene = readFor(job);
-  load.reading = reading.seconds();
-  ConvergenceLog log(job, scene);
-  Guiding guiding;
-  if (stored) {
-    const Stopwatch restoring;
-    guiding.training = restoreIllumination(*stored, job.illumination, scene);
-    if (mayUseProduct(job.integrator) && !guiding.training.report.learntFractions)
-      printNote(kTool, fmt::format("{}: the records have learnt no BSDF sampling fractions (trained by guided, or with "
-                                   "--bsdf-fraction fixed); all use {:.1f}",
-                                   job.illumination.string(), kInitialBsdfFraction));
-    load.restoring = restoring.seconds();
-  }
-  if (mayUseProduct(job.integrator))
-    guiding.caches.emplace(job.cacheFolder, lobeRequests(scene), lobefitCommand(job), job.reduction);
-  const Stopwatch building;
-  RenderScene renderScene(scene, job.shadowSurfaces);
-  load.building = building.seconds();
-  load.embree = renderScene.tracer.buildSeconds();
-  const RayCamera camera(scene.camera, scene.filter);
-  const Stopwatch learning;
-  renderScene.lights.use(learnLightCells(renderScene, camera, job.seed));
-  guiding.secondsLights = learning.seconds();
-  const std::optional<Receiver> receiver = receiverFor(job, renderScene, camera);
-  if (job.integrator != IntegratorKind::path) {
-    if (!stored) train(job, renderScene, camera, guiding);
-    guiding.reduceRecords(job.reduction);
-    guiding.sampler.emplace(scene, guiding.training.field, guiding.cachesOrNull());
-  }
-  if (receiver) drawRecord(job, renderScene, *receiver, guiding.training);
-
-  const std::unique_ptr<Integrator> integrator = makeIntegrator(job, renderScene, camera, guiding);
-  Film film(camera.width(), camera.height());
-  const RenderResult rendered = renderWithProgress(job, camera, *integrator, guiding.seconds(), film, log);
-  const RunResult result{rendered, guiding, film.dropped()};
-  if (result.dropped > 0)
-    printWarning(kTool, fmt::format("{} samples were negative or not finite, and were discarded", result.dropped));
-  const std::uint64_t hash = pictureHash(scene);
-  for (const auto& output : job.outputs) writeImage(output, film.mean(), attributes(job, hash, result));
-  log.write();
-  if (!job.stats.empty()) writeAtomically(job.stats, statistics(job, load, result).dump(2) + "\n");
+  Run run(job, stop);
+  stoppable(stop, "before the first sample, so no picture is written", [&] { run.prepare(); });
+  run.render();
+  run.finish();
 }
 
 }  // namespace lobe

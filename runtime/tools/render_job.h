@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "runtime/core/stop.h"
 #include "runtime/image/image.h"
 #include "runtime/render/integrators/path_loop.h"
 #include "runtime/render/integrators/renderer.h"
@@ -17,6 +18,8 @@ namespace lobe {
 
 /// automatic: path or product, whichever reaches the lower error in a pilot (pilot.h).
 enum class IntegratorKind { automatic, path, guided, product };
+/// The name that the option has.
+const char* nameOf(IntegratorKind kind);
 
 /// Russian roulette by the path's throughput, or efficiency-aware Russian roulette and splitting (sample_counts.h).
 enum class RussianRoulette { throughput, efficiency };
@@ -48,6 +51,13 @@ struct RenderJob {
 
   std::filesystem::path reference, convergence, stats;  ///< empty: not used
 
+  /// Seconds between snapshots of the outputs while rendering; 0: none. Empty: kSnapshotSeconds if the run is expected
+  /// to take longer than kLongRun, or writes checkpoints.
+  std::optional<double> snapshotEvery;
+  static constexpr double kSnapshotSeconds = 60, kLongRun = 120;
+  std::filesystem::path checkpoint;  ///< written after training, with each snapshot and at the end; empty: not used
+  std::filesystem::path resume;      ///< checkpoint to continue; empty: not used
+
   std::optional<std::pair<int, int>> record;         ///< pixel whose illumination record is plotted
   std::filesystem::path recordImage = "record.png";  ///< file of the plot
 
@@ -58,7 +68,9 @@ struct RenderJob {
 /// The lobefit command that makes the caches for a job, for error messages.
 std::string lobefitCommand(const RenderJob& job);
 
-/// Reads the scene, trains, renders and writes all outputs; diagnostics go to stderr. Throws std::runtime_error.
-void run(const RenderJob& job);
+/// Reads the scene, trains, renders and writes all outputs; diagnostics go to stderr. An output that cannot be written
+/// does not prevent the others from being written. Throws std::runtime_error. If stop is set, ends early and throws
+/// Stopped: in training, nothing is written; in rendering, the outputs show the samples so far.
+void run(const RenderJob& job, const StopFlag& stop);
 
 }  // namespace lobe

@@ -5,7 +5,6 @@
 
 #include <fmt/format.h>
 
-#include "runtime/core/atomic_file.h"
 #include "runtime/guiding/field_data.h"
 #include "runtime/guiding/illumination_store.h"
 #include "scenes/scene_hash.h"
@@ -36,8 +35,8 @@ StoredTrainingSettings settingsOf(const TrainingPlan& plan, const TrainingReport
 
 }  // namespace
 
-void saveIllumination(const std::filesystem::path& path, const TrainedIllumination& trained, const TrainingPlan& plan,
-                      const Scene& scene, const std::filesystem::path& sceneFile) {
+std::vector<std::byte> encodeIllumination(const TrainedIllumination& trained, const TrainingPlan& plan,
+                                          const Scene& scene, const std::filesystem::path& sceneFile) {
   IlluminationInfo info;
   info.toolVersion = LOBE_VERSION;
   info.scene = nameOf(sceneFile);
@@ -45,8 +44,7 @@ void saveIllumination(const std::filesystem::path& path, const TrainedIlluminati
   info.settings = settingsOf(plan, trained.report);
   info.particles = trained.report.particles();
   info.undersampledFraction = trained.report.undersampledFraction;
-  const std::vector<std::byte> bytes = storeIllumination(cacheOf(trained.field), std::move(info));
-  writeAtomically(path, std::span<const std::byte>(bytes));
+  return storeIllumination(cacheOf(trained.field), std::move(info));
 }
 
 TrainedIllumination restoreIllumination(const IlluminationFile& file, const std::filesystem::path& path,

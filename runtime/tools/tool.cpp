@@ -1,24 +1,73 @@
 #include "runtime/tools/tool.h"
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <csignal>
+#include <iostream>
 #include <new>
 #include <string_view>
+#include <system_error>
 
 #include <fmt/format.h>
 
 namespace lobe {
 namespace {
 
+/// Opens closed standard streams, so that no other file gets their descriptors and receives what is printed to them.
+/// Printing to the replacement of stdout fails, as it should.
+void openClosedStreams() {
+  int file = 0;
+  do {
+    file = ::open("/dev/null", O_RDONLY);
+  } while (file >= 0 && file <= STDERR_FILENO);
+  if (file >= 0) ::close(file);
+}
+
+/// Makes a write beyond a file size limit and a write to a closed pipe fail with an error instead of ending the
+/// program.
+void ignoreSignalsOfWrites() {
+  for (const int signal : {SIGXFSZ, SIGPIPE}) std::signal(signal, SIG_IGN);
+}
+
+/// Throws std::system_error if something printed to stdout could not be written.
+void flushOutput() {
+  std::cout.flush();
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return;
+  throw std::system_error(errno, std::generic_category(), "cannot write to standard output");
+}
+
 int fail(const std::string& name, std::string_view message, int code) {
   while (!message.empty()) {
     const std::size_t end = std::min(message.find('\n'), message.size());
-    fmt::print(stderr, "{}: error: {}\n", name, message.substr(0, end));
+    printDiagnostic(fmt::format("{}: error: {}\n", name, message.substr(0, end)));
     message.remove_prefix(std::min(end + 1, message.size()));
   }
   return code;
+}
+
+/// The signal that has asked the tool to stop; 0: none.
+StopFlag stopSignal = 0;
+static_assert(StopFlag::is_always_lock_free, "it is set by a signal handler");
+
+/// The next signal ends the program at once. Signals that are ignored stay so.
+extern "C" void requestStop(int signal) {
+  stopSignal = signal;
+  for (const int other : {SIGINT, SIGTERM}) {
+    struct sigaction action {};
+    ::sigaction(other, nullptr, &action);
+    if (action.sa_handler == requestStop) std::signal(other, SIG_DFL);
+  }
+}
+
+/// Ends the program like SIGPIPE does by default, without a message, because the reader of its output has ended.
+int endWithReader() {
+  std::signal(SIGPIPE, SIG_DFL);
+  std::raise(SIGPIPE);
+  return 128 + SIGPIPE;  // if the signal is blocked
 }
 
 /// For messages of libraries, which may have several lines.
@@ -64,11 +113,40 @@ void takeRenamed(const std::string& tool, const RenamedOption& option, std::vect
   }
 }
 
+/// --help and --version.
+int printHelp(const std::string& name, const CLI::App& app, const CLI::Success& request) {
+  app.exit(request);
+  try {
+    flushOutput();
+    return 0;
+  } catch (const std::system_error& e) {
+    return e.code() == std::errc::broken_pipe ? endWithReader() : fail(name, e.what(), 1);
+  }
+}
+
 }  // namespace
+
+void printDiagnostic(std::string_view text) {
+  std::fwrite(text.data(), 1, text.size(), stderr);
+}
+
+const StopFlag& stopOnSignals() {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    struct sigaction action {};
+    ::sigaction(signal, nullptr, &action);
+    if (action.sa_handler == SIG_IGN) continue;  // as in background jobs of shells
+    action.sa_handler = requestStop;
+    action.sa_flags = SA_RESTART;
+    ::sigaction(signal, &action, nullptr);
+  }
+  return stopSignal;
+}
 
 int runTool(const std::string& name, const std::string& description, int argc, char** argv,
             const std::function<void(CLI::App&)>& declare, const std::function<void()>& work,
             const std::vector<RenamedOption>& renamed) {
+  openClosedStreams();
+  ignoreSignalsOfWrites();
   CLI::App app(description, name);
   try {
     app.option_defaults()->always_capture_default();
@@ -79,27 +157,40 @@ int runTool(const std::string& name, const std::string& description, int argc, c
     std::ranges::reverse(arguments);  // CLI11 expects the arguments in reverse order
     app.parse(arguments);
     work();
-    if (std::fflush(stdout) != 0) throw std::runtime_error("cannot write to standard output");
+    flushOutput();
     return 0;
   } catch (const CLI::Success& e) {
-    return app.exit(e);
+    return printHelp(name, app, e);
   } catch (const CLI::ParseError& e) {
     return fail(name, asOneLine(fmt::format("{} (see {} --help)", e.what(), name)), 2);
   } catch (const UsageError& e) {
     return fail(name, e.what(), 2);
+  } catch (const Stopped& e) {
+    printDiagnostic(fmt::format("{}: interrupted: {}\n", name, e.what()));
+    return 128 + stopSignal;
   } catch (const std::bad_alloc&) {
     return fail(name, "out of memory", 1);
+  } catch (const std::system_error& e) {
+    return e.code() == std::errc::broken_pipe ? endWithReader() : fail(name, e.what(), 1);
   } catch (const std::exception& e) {
     return fail(name, e.what(), 1);
   }
 }
 
 void printWarning(const std::string& name, const std::string& message) {
-  fmt::print(stderr, "{}: warning: {}\n", name, message);
+  printDiagnostic(fmt::format("{}: warning: {}\n", name, message));
 }
 
 void printNote(const std::string& name, const std::string& message) {
-  fmt::print(stderr, "{}: note: {}\n", name, message);
+  printDiagnostic(fmt::format("{}: note: {}\n", name, message));
+}
+
+void checkNotRead(const std::filesystem::path& output, const std::vector<std::filesystem::path>& inputs) {
+  std::error_code error;
+  if (!std::filesystem::exists(output, error)) return;
+  for (const std::filesystem::path& input : inputs)
+    if (std::filesystem::equivalent(input, output, error))  // false if the input does not exist
+      throw UsageError(fmt::format("{}: is both an input and the output, and would be overwritten", output.string()));
 }
 
 void addDefinitions(CLI::App& app, std::map<std::string, std::string>& definitions) {
@@ -127,7 +218,7 @@ Progress::Progress(std::string label, double total)
 }
 
 Progress::~Progress() {
-  if (drawn_ > 0) std::fputc('\n', stderr);
+  if (drawn_ > 0) printDiagnostic("\n");
 }
 
 void Progress::advance(double n) {
@@ -149,11 +240,11 @@ void Progress::print(Clock::time_point now) {
   else if (fraction >= kMinFractionToExtrapolate)
     line += ", " + formatSeconds(elapsed * (1 - fraction) / fraction) + " left";
   if (!terminal_) {
-    fmt::print(stderr, "{}\n", line);
+    printDiagnostic(line + "\n");
     return;
   }
   const std::size_t width = displayWidth(line);
-  fmt::print(stderr, "\r{}{:{}}", line, "", std::max(drawn_, width) - width);
+  printDiagnostic(fmt::format("\r{}{:{}}", line, "", std::max(drawn_, width) - width));
   drawn_ = width;
 }
 

@@ -4,14 +4,20 @@
 
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <mutex>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
+
+#include "runtime/core/stop.h"
 
 namespace lobe {
 
@@ -30,9 +36,17 @@ struct RenamedOption {
 /// Runs a tool: declare adds options to the CLI::App, which parses argv, then work runs. Returns the exit code: 0 on
 /// success (also after --help and --version); 1 if work throws; 2 if parsing fails or anything throws UsageError.
 /// Errors go to stderr, with "NAME: error: " before each line of the message. Renamed options are accepted with a note.
+/// If work throws Stopped, its message is printed and the result is 128 plus the number of the signal.
 int runTool(const std::string& name, const std::string& description, int argc, char** argv,
             const std::function<void(CLI::App&)>& declare, const std::function<void()>& work,
             const std::vector<RenamedOption>& renamed = {});
+
+/// Prints text to stderr. Failures are ignored, because they must not end the work.
+void printDiagnostic(std::string_view text);
+
+/// A flag that holds the number of the first SIGINT or SIGTERM after this call, for work that can end early and leave
+/// complete files. The second one ends the program at once. Ignored signals stay ignored.
+const StopFlag& stopOnSignals();
 
 /// Prints "NAME: warning: MESSAGE" to stderr.
 void printWarning(const std::string& name, const std::string& message);
@@ -40,11 +54,33 @@ void printWarning(const std::string& name, const std::string& message);
 /// Prints "NAME: note: MESSAGE" to stderr.
 void printNote(const std::string& name, const std::string& message);
 
+/// Throws UsageError if writing output would overwrite one of the inputs, also by other names of the same file.
+void checkNotRead(const std::filesystem::path& output, const std::vector<std::filesystem::path>& inputs);
+
 /// Adds the option -D NAME=VALUE, which may be repeated and fills definitions.
 void addDefinitions(CLI::App& app, std::map<std::string, std::string>& definitions);
 
 /// Adds the option --threads N with N ≥ 1; threads keeps its value (0: all cores) if the option is not given.
 void addThreads(CLI::App& app, int& threads);
+
+/// A validator of CLI11 that accepts one of the names and replaces it by its value; names: pairs of a name and an
+/// enumerator.
+template <class Names>
+CLI::Validator oneOf(const Names& names) {
+  std::map<std::string, std::string> values;
+  std::vector<std::string> all;
+  for (const auto& [name, value] : names) {
+    values[name] = std::to_string(static_cast<int>(value));
+    all.push_back(name);
+  }
+  const auto replace = [values, all](std::string& text) {
+    const auto found = values.find(text);
+    if (found == values.end()) return fmt::format("must be one of {}, not '{}'", fmt::join(all, ", "), text);
+    text = found->second;
+    return std::string();
+  };
+  return {replace, fmt::format("{{{}}}", fmt::join(all, ","))};
+}
 
 /// Shows the progress of long work on stderr. On a terminal, one line with the remaining time is redrawn up to five
 /// times per second; otherwise a new line is printed every ten seconds, and nothing for shorter work. advance may be

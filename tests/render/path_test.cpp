@@ -341,6 +341,83 @@ TEST_CASE("render: an image depends on the seed but not on threads or waves") {
   CHECK_FALSE(equal(one, image(1, 6)));
 }
 
+namespace {
+
+/// Sets the flag after a number of samples, like a signal at a random moment.
+class StoppingIntegrator : public Integrator {
+ public:
+  StoppingIntegrator(const Integrator& inner, int samples, StopFlag& flag)
+      : inner_(inner), left_(samples), flag_(flag) {}
+  Rgb radiance(const Ray& ray, Sampler& rng, PathStatistics& statistics) const override {
+    if (--left_ == 0) flag_ = 1;
+    return inner_.radiance(ray, rng, statistics);
+  }
+
+ private:
+  const Integrator& inner_;
+  mutable std::atomic<int> left_;
+  StopFlag& flag_;
+};
+
+bool sameFilm(const Film& a, const Film& b) {
+  return std::ranges::equal(a.pixels(), b.pixels(), [](const Film::Pixel& p, const Film::Pixel& q) {
+    return std::memcmp(&p, &q, sizeof p) == 0;
+  });
+}
+
+}  // namespace
+
+TEST_CASE("render: stopped at any moment and continued, an image has the same bytes") {
+  const Scene scene = roomScene();
+  const RenderScene ready(scene);
+  Camera camera;
+  camera.width = 50, camera.height = 40;
+  camera.toWorld.topRightCorner<3, 1>() = Vec3(0, 1.5f, -1.9f);
+  const RayCamera pinhole(camera, {});
+  const PathIntegrator integrator(ready, {});
+  RenderOptions options;
+  options.samples = 9, options.firstSample = 3;
+  Film whole(camera.width, camera.height);
+  const RenderResult uninterrupted = render(pinhole, integrator, whole, options);
+  CHECK_FALSE(uninterrupted.stopped);
+  int uneven = 0;
+  for (const int moment : {1, 700, 2001, 5000, 9100, 13000, 17999}) {
+    StopFlag stop = 0;
+    options.stop = &stop;
+    Film film(camera.width, camera.height);
+    const RenderResult part = render(pinhole, StoppingIntegrator(integrator, moment, stop), film, options);
+    const auto [least, most] = film.sampleRange();
+    uneven += least < most;
+    CHECK(part.total.samples == static_cast<int>(least));
+    stop = 0;
+    const RenderResult result = render(pinhole, integrator, film, options, {}, part);
+    CHECK_FALSE(result.stopped);
+    CHECK(result.total.samples == 9);
+    CHECK(result.statistics.paths == uninterrupted.statistics.paths);
+    CHECK(result.statistics.rays() == uninterrupted.statistics.rays());
+    CHECK(sameFilm(film, whole));
+  }
+  CHECK(uneven > 2);
+}
+
+TEST_CASE("render: an integrator that fails ends rendering with its error") {
+  const Scene scene = roomScene();
+  const RenderScene ready(scene);
+  Camera camera;
+  camera.width = 50, camera.height = 40;
+  struct Failing : Integrator {
+    mutable std::atomic<int> left = 3000;
+    Rgb radiance(const Ray&, Sampler&, PathStatistics&) const override {
+      if (--left == 0) throw std::runtime_error("injected");
+      return Rgb::Zero();
+    }
+  };
+  Film film(camera.width, camera.height);
+  RenderOptions options;
+  options.samples = 5;
+  CHECK_THROWS_WITH(render(RayCamera(camera, {}), Failing(), film, options), "injected");
+}
+
 TEST_CASE("render: the time limit is met") {
   Scene scene = roomScene();
   const RenderScene ready(scene);
@@ -351,7 +428,7 @@ TEST_CASE("render: the time limit is met") {
   RenderOptions options;
   options.seconds = 0.5;
   int waves = 0;
-  const auto count = [&](const RenderProgress&) { ++waves; };
+  const auto count = [&](const RenderResult&) { ++waves; };
   const RenderResult result = render(RayCamera(camera, {}), PathIntegrator(ready, {}), film, options, count);
   CHECK(result.total.seconds < 0.75);  // generous: other work may run beside the test
   CHECK(result.total.seconds > 0.25);

@@ -1,5 +1,6 @@
 #include "runtime/render/film/film.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -46,6 +47,11 @@ Image Film::varianceOfMean() const {
     const double n = p.count;
     return std::max(0.0, p.squares[c] - p.sum[c] * p.sum[c] / n) / (n * (n - 1.0));
   });
+}
+
+std::pair<std::uint32_t, std::uint32_t> Film::sampleRange() const {
+  const auto [least, most] = std::ranges::minmax(pixels_, {}, &Pixel::samples);
+  return {least.samples(), most.samples()};
 }
 
 std::uint64_t Film::dropped() const {

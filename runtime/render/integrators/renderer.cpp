@@ -6,9 +6,8 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
 
+#include "runtime/core/parallel.h"
 #include "runtime/core/stopwatch.h"
 
 namespace lobe {
@@ -16,48 +15,52 @@ namespace {
 
 constexpr int kTileSize = 16;
 
-/// Samples [first, last) of every pixel.
-struct Wave {
-  int first, last;
-};
-
 class WaveRenderer {
  public:
   WaveRenderer(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options)
-      : camera_(camera), integrator_(integrator), film_(film), seed_(options.seed), sampling_(options.sampling) {
+      : camera_(camera), integrator_(integrator), film_(film), options_(options) {
     columns_ = (film.width() + kTileSize - 1) / kTileSize;
     tiles_ = columns_ * ((film.height() + kTileSize - 1) / kTileSize);
   }
 
-  PathStatistics render(const Wave& wave) const {
-    std::vector<PathStatistics> perTile(tiles_);
-    const oneapi::tbb::blocked_range<int> range(0, tiles_, 1);
-    oneapi::tbb::parallel_for(
-        range,
-        [&](const auto& tiles) {
-          for (int tile = tiles.begin(); tile < tiles.end(); ++tile) perTile[tile] = renderTile(tile, wave);
-        },
-        oneapi::tbb::simple_partitioner());
-    PathStatistics sum;
-    for (const PathStatistics& s : perTile) sum += s;
-    return sum;
+  struct Wave {
+    PathStatistics statistics;
+    bool complete = true;
+  };
+
+  /// Adds to every pixel the samples that it lacks to have `samples` of them.
+  Wave render(int samples) const {
+    std::vector<std::optional<PathStatistics>> perTile(tiles_);
+    parallelForEach(0, tiles_, [&](int tile) {
+      if (!stopped()) perTile[tile] = renderTile(tile, samples);
+    });
+    Wave wave;
+    for (const auto& statistics : perTile)
+      if (statistics)
+        wave.statistics += *statistics;
+      else
+        wave.complete = false;
+    return wave;
   }
 
+  bool stopped() const { return options_.stop && *options_.stop != 0; }
+
  private:
-  PathStatistics renderTile(int tile, const Wave& wave) const {
+  PathStatistics renderTile(int tile, int samples) const {
     PathStatistics statistics;
     const int x0 = tile % columns_ * kTileSize;
     const int y0 = tile / columns_ * kTileSize;
     for (int y = y0; y < std::min(y0 + kTileSize, film_.height()); ++y)
-      for (int x = x0; x < std::min(x0 + kTileSize, film_.width()); ++x) renderPixel(x, y, wave, statistics);
+      for (int x = x0; x < std::min(x0 + kTileSize, film_.width()); ++x) renderPixel(x, y, samples, statistics);
     return statistics;
   }
 
-  void renderPixel(int x, int y, const Wave& wave, PathStatistics& statistics) const {
+  void renderPixel(int x, int y, int samples, PathStatistics& statistics) const {
     const auto pixel = static_cast<std::uint64_t>(y) * film_.width() + x;
-    for (int s = wave.first; s < wave.last; ++s) {
-      Sampler rng = sampling_ == PixelSampling::sobol ? Sampler::stratified(seed_, pixel, static_cast<std::uint32_t>(s))
-                                                      : Sampler(seed_, pixel, static_cast<std::uint64_t>(s));
+    for (int s = static_cast<int>(film_.pixel(x, y).samples()); s < samples; ++s) {
+      const std::uint32_t index = static_cast<std::uint32_t>(options_.firstSample) + static_cast<std::uint32_t>(s);
+      Sampler rng = options_.sampling == PixelSampling::sobol ? Sampler::stratified(options_.seed, pixel, index)
+                                                              : Sampler(options_.seed, pixel, index);
       const Ray ray = camera_.sample(x, y, rng);
       film_.add(x, y, integrator_.radiance(ray, rng, statistics));
     }
@@ -66,8 +69,7 @@ class WaveRenderer {
   const RayCamera& camera_;
   const Integrator& integrator_;
   Film& film_;
-  std::uint64_t seed_;
-  PixelSampling sampling_;
+  const RenderOptions& options_;
   int columns_, tiles_;
 };
 
@@ -81,7 +83,8 @@ class WavePlan {
   int next(const RenderProgress& progress) const {
     if (progress.samples == 0) return 1;
     const double cost = std::max(progress.seconds / progress.samples, 1e-9);
-    const double longest = options_.seconds ? *options_.seconds / kWavesPerBudget : kWaveSeconds;
+    const double longest =
+        std::min(options_.seconds ? *options_.seconds / kWavesPerBudget : kWaveSeconds, options_.longestWave);
     const double wanted = std::clamp(longest / cost, 1.0, static_cast<double>(progress.samples));
     return static_cast<int>(std::max(0.0, std::min(wanted, left(progress, cost))));
   }
@@ -110,19 +113,23 @@ void RenderOptions::validate() const {
 }
 
 RenderResult render(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options,
-                    const AfterWave& afterWave) {
+                    const AfterWave& afterWave, const RenderResult& before) {
   options.validate();
   const WaveRenderer renderer(camera, integrator, film, options);
   const WavePlan plan(options);
-  RenderResult result{{}, {0.0, 0}};
+  RenderResult result = before;
   RenderProgress& progress = result.total;
+  progress.samples = static_cast<int>(film.sampleRange().first);
+  result.stopped = false;
   while (const int samples = plan.next(progress)) {
     const Stopwatch watch;
-    const int first = options.firstSample + progress.samples;
-    result.statistics += renderer.render({first, first + samples});
+    const WaveRenderer::Wave wave = renderer.render(progress.samples + samples);
+    result.statistics += wave.statistics;
     progress.seconds += watch.seconds();
+    result.stopped = !wave.complete;
+    if (result.stopped) break;
     progress.samples += samples;
-    if (afterWave) afterWave(progress);
+    if (afterWave) afterWave(result);
   }
   return result;
 }

@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 
+#include "runtime/core/stop.h"
 #include "runtime/render/film/camera.h"
 #include "runtime/render/film/film.h"
 #include "runtime/render/integrators/integrator.h"
@@ -21,7 +22,9 @@ struct RenderOptions {
   std::optional<int> samples;     ///< per pixel: the same image for a seed, on any number of threads
   std::optional<double> seconds;  ///< stops when another wave would not fit; renders at least one sample per pixel
   PixelSampling sampling = PixelSampling::sobol;
-  int firstSample = 0;  ///< index of the first sample of every pixel; firstSample + samples must fit an int
+  int firstSample = 0;             ///< index of the first sample of every pixel; firstSample + samples must fit an int
+  double longestWave = kInfinity;  ///< approximate limit in seconds of the time between calls of AfterWave
+  const StopFlag* stop = nullptr;  ///< ends rendering after the current tiles when it is set
 
   /// Throws std::runtime_error that names the field.
   void validate() const;
@@ -29,20 +32,23 @@ struct RenderOptions {
 
 struct RenderProgress {
   double seconds;  ///< rendering time so far, without the time spent in callbacks
-  int samples;     ///< per pixel so far
+  int samples;     ///< of every pixel so far
 };
-
-/// Called after each wave, from the calling thread, while no thread writes to the film.
-using AfterWave = std::function<void(const RenderProgress&)>;
 
 struct RenderResult {
   PathStatistics statistics;
-  RenderProgress total;
+  RenderProgress total{0.0, 0};
+  bool stopped = false;  ///< ended early because of RenderOptions::stop; some pixels may have further samples
 };
 
-/// Adds samples to the film, which must be empty and have the size of the camera's image. Sample s of pixel i, counted
-/// from firstSample, uses the random stream (seed, i, s).
+/// Called after each wave, from the calling thread, while no thread writes to the film.
+using AfterWave = std::function<void(const RenderResult&)>;
+
+/// Adds samples to the film, which must have the size of the camera's image. Sample s of pixel i, counted from
+/// firstSample, uses the random stream (seed, i, s). A film that already has samples is continued: each pixel gets the
+/// samples that it lacks, so that the result has the same bytes as that of an uninterrupted run. `before` is the result
+/// of the run that has filled the film.
 RenderResult render(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options,
-                    const AfterWave& afterWave = {});
+                    const AfterWave& afterWave = {}, const RenderResult& before = {});
 
 }  // namespace lobe

@@ -5,8 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include <oneapi/tbb/parallel_invoke.h>
-
+#include "runtime/core/parallel.h"
 #include "runtime/core/stopwatch.h"
 
 namespace lobe {
@@ -92,8 +91,8 @@ class Training {
     importons.importance.merge(std::move(photons.importance));
     PassReport report{0, samples_.particles(), 0, std::nullopt};
     // The updates run in parallel, because each has parts that leave threads idle. Releasing memory takes time too.
-    oneapi::tbb::parallel_invoke([&] { importance_.update(importons.importance); },
-                                 [&] { report.logLikelihood = radiance_.update(samples_); }, [&] { before.clear(); });
+    parallelInvoke([&] { importance_.update(importons.importance); },
+                   [&] { report.logLikelihood = radiance_.update(samples_); }, [&] { before.clear(); });
     report.records = radiance_.records();
     report.seconds = watch.seconds();
     return report;

@@ -1,0 +1,94 @@
+#include "runtime/tools/checkpoint.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+namespace lobe {
+namespace {
+
+static_assert(sizeof(Film::Pixel) == sizeof(StoredPixel));
+
+StoredPixel stored(const Film::Pixel& p) {
+  return {{p.sum[0], p.sum[1], p.sum[2]}, {p.squares[0], p.squares[1], p.squares[2]}, p.count, p.dropped};
+}
+
+Film::Pixel loaded(const StoredPixel& p) {
+  return {{p.sum[0], p.sum[1], p.sum[2]}, {p.squares[0], p.squares[1], p.squares[2]}, p.count, p.dropped};
+}
+
+/// All counters of the statistics, in a fixed order.
+template <class Statistics>
+auto countersOf(Statistics& statistics) {
+  std::vector<decltype(&statistics.paths)> all{&statistics.paths, &statistics.segments, &statistics.shadowRays};
+  for (auto& count : statistics.strategies) all.push_back(&count);
+  for (auto& count : statistics.decisions) all.push_back(&count);
+  return all;
+}
+
+}  // namespace
+
+void checkSameRun(const CheckpointFile& file, const std::filesystem::path& path, const RunSettings& settings) {
+  const RunSettings& stored = file.info().settings;
+  for (std::size_t i = 0; i < std::min(stored.size(), settings.size()); ++i) {
+    if (stored[i] == settings[i]) continue;
+    const auto& [name, value] = settings[i];
+    if (stored[i].first != name) break;
+    throw std::runtime_error(fmt::format("{}: a checkpoint of another run: {} was {}, and is {} now", path.string(),
+                                         name, stored[i].second, value));
+  }
+  if (stored != settings)
+    throw std::runtime_error(fmt::format("{}: a checkpoint of another run: it has other settings", path.string()));
+}
+
+std::vector<std::byte> encodeCheckpoint(const RunSettings& settings, const Film& film, const RenderResult& result,
+                                        const TrainingReport& training, std::span<const std::byte> illumination) {
+  CheckpointInfo info;
+  info.settings = settings;
+  info.width = static_cast<std::uint32_t>(film.width());
+  info.height = static_cast<std::uint32_t>(film.height());
+  info.trainingSeconds = training.seconds;
+  info.renderingSeconds = result.total.seconds;
+  for (const PassReport& pass : training.passes)
+    info.passes.push_back({pass.seconds, pass.particles, pass.records,
+                           pass.logLikelihood.value_or(std::numeric_limits<double>::quiet_NaN())});
+  info.undersampledFraction = training.undersampledFraction;
+  info.learntFractions = training.learntFractions;
+  for (const std::uint64_t* count : countersOf(result.statistics)) info.counters.push_back(*count);
+  std::vector<StoredPixel> pixels(film.pixels().size());
+  std::ranges::transform(film.pixels(), pixels.begin(), stored);
+  return encodeCheckpoint(info, pixels, illumination);
+}
+
+Film filmOf(const CheckpointFile& file) {
+  std::vector<Film::Pixel> pixels(file.pixels().size());
+  std::ranges::transform(file.pixels(), pixels.begin(), loaded);
+  return {static_cast<int>(file.info().width), static_cast<int>(file.info().height), std::move(pixels)};
+}
+
+RenderResult resultOf(const CheckpointFile& file, const std::filesystem::path& path) {
+  RenderResult result;
+  result.total.seconds = file.info().renderingSeconds;
+  const std::vector<std::uint64_t*> counters = countersOf(result.statistics);
+  if (counters.size() != file.info().counters.size())
+    throw std::runtime_error(fmt::format("{}: damaged: {} counters, expected {}", path.string(),
+                                         file.info().counters.size(), counters.size()));
+  for (std::size_t i = 0; i < counters.size(); ++i) *counters[i] = file.info().counters[i];
+  return result;
+}
+
+TrainingReport trainingOf(const CheckpointFile& file) {
+  TrainingReport report;
+  for (const StoredPass& pass : file.info().passes)
+    report.passes.push_back({pass.seconds, pass.particles, static_cast<std::size_t>(pass.records),
+                             std::isnan(pass.logLikelihood) ? std::nullopt : std::optional(pass.logLikelihood)});
+  report.seconds = file.info().trainingSeconds;
+  report.undersampledFraction = file.info().undersampledFraction;
+  report.learntFractions = file.info().learntFractions;
+  return report;
+}
+
+}  // namespace lobe

@@ -1,0 +1,95 @@
+#include "schema/checkpoint_file.h"
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "checkpoint_generated.h"
+#include "schema/cache_checks.h"
+
+namespace lobe {
+namespace {
+
+static_assert(sizeof(StoredPixel) == sizeof(fb::Pixel) && alignof(StoredPixel) == alignof(fb::Pixel));
+static_assert(sizeof(StoredPass) == sizeof(fb::TrainingPass) && alignof(StoredPass) == alignof(fb::TrainingPass));
+static_assert(std::is_trivially_copyable_v<StoredPixel> && std::is_standard_layout_v<StoredPixel>);
+
+bool isNumber(double value) {
+  return value >= 0 && std::isfinite(value);
+}
+
+void checkPixel(const StoredPixel& pixel, std::size_t index, const std::string& name) {
+  for (const auto& numbers : {pixel.sum, pixel.squares})
+    for (const double value : numbers)
+      if (!isNumber(value)) refuseDamaged(name, fmt::format("pixel {}: a sum is negative or not finite", index));
+  if (std::uint64_t{pixel.count} + pixel.dropped > std::numeric_limits<int>::max())
+    refuseDamaged(name, fmt::format("pixel {}: number of samples out of range", index));
+}
+
+CheckpointInfo readInfo(const fb::Checkpoint& file) {
+  CheckpointInfo info;
+  for (const fb::Setting* setting : *file.settings())
+    info.settings.emplace_back(setting->name()->str(), setting->value()->str());
+  info.width = file.width();
+  info.height = file.height();
+  info.trainingSeconds = file.seconds_training();
+  info.renderingSeconds = file.seconds_rendering();
+  const std::span<const StoredPass> passes = inPlace<StoredPass>(*file.passes());
+  info.passes.assign(passes.begin(), passes.end());
+  info.undersampledFraction = file.undersampled_fraction();
+  info.learntFractions = file.learnt_fractions();
+  info.counters.assign(file.counters()->begin(), file.counters()->end());
+  return info;
+}
+
+}  // namespace
+
+CheckpointFile::CheckpointFile(FileContent file, const std::filesystem::path& path) : file_(std::move(file)) {
+  const std::string name = path.string();
+  const std::span<const std::byte> payload = unwrapPayload(kCheckpointFormat, file_.bytes(), name);
+  const auto& root = verifiedBuffer<fb::Checkpoint>(payload, name, "checkpoint");
+  info_ = readInfo(root);
+  pixels_ = inPlace<StoredPixel>(*root.pixels());
+  illumination_ = std::as_bytes(std::span(root.illumination()->data(), root.illumination()->size()));
+  if (pixels_.empty() || std::uint64_t{info_.width} * info_.height != pixels_.size())
+    refuseDamaged(name, fmt::format("{} pixels for a film of {}x{}", pixels_.size(), info_.width, info_.height));
+  for (std::size_t i = 0; i < pixels_.size(); ++i) checkPixel(pixels_[i], i, name);
+  if (!isNumber(info_.trainingSeconds) || !isNumber(info_.renderingSeconds))
+    refuseDamaged(name, "a time is negative or not finite");
+  if (!(info_.undersampledFraction >= 0 && info_.undersampledFraction <= 1))
+    refuseDamaged(name, "fraction of undersampled records out of range");
+}
+
+CheckpointFile CheckpointFile::open(const std::filesystem::path& path) {
+  return {FileContent(path), path};
+}
+
+std::vector<std::byte> encodeCheckpoint(const CheckpointInfo& info, std::span<const StoredPixel> pixels,
+                                        std::span<const std::byte> illumination) {
+  constexpr std::size_t kOthers = 1 << 20;  // more than the other fields take
+  const std::size_t size = pixels.size_bytes() + illumination.size() + kOthers;
+  if (size > FLATBUFFERS_MAX_BUFFER_SIZE) throw std::runtime_error("the film and the illumination are too large");
+  flatbuffers::FlatBufferBuilder builder(size);
+  std::vector<flatbuffers::Offset<fb::Setting>> settings;
+  for (const auto& [name, value] : info.settings) {
+    const auto nameText = builder.CreateString(name);
+    settings.push_back(fb::CreateSetting(builder, nameText, builder.CreateString(value)));
+  }
+  // In separate statements, because the order of evaluation of function arguments is unspecified.
+  const auto settingVector = builder.CreateVector(settings);
+  const auto pixelVector =
+      builder.CreateVectorOfStructs(reinterpret_cast<const fb::Pixel*>(pixels.data()), pixels.size());
+  const auto illuminationVector =
+      builder.CreateVector(reinterpret_cast<const std::uint8_t*>(illumination.data()), illumination.size());
+  const auto passVector =
+      builder.CreateVectorOfStructs(reinterpret_cast<const fb::TrainingPass*>(info.passes.data()), info.passes.size());
+  const auto counterVector = builder.CreateVector(info.counters);
+  builder.Finish(fb::CreateCheckpoint(builder, settingVector, info.width, info.height, pixelVector, illuminationVector,
+                                      info.trainingSeconds, info.renderingSeconds, passVector,
+                                      info.undersampledFraction, info.learntFractions, counterVector));
+  return wrapPayload(kCheckpointFormat, std::as_bytes(std::span(builder.GetBufferPointer(), builder.GetSize())));
+}
+
+}  // namespace lobe

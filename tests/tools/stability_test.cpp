@@ -1,0 +1,324 @@
+// What the tools do when files, pipes and signals fail: diagnostics are never essential, one output does not take the
+// others with it, and inputs are never overwritten.
+
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
+
+#include "runtime/image/image.h"
+#include "runtime/image/image_output.h"
+#include "tests/support/loberender_test_tools.h"
+
+using namespace lobe;
+using namespace lobe::test;
+namespace fs = std::filesystem;
+using Catch::Contains;
+
+namespace {
+
+const std::string kPath = "loberender scene.xml --integrator path";
+
+/// A command that runs for minutes unless it is interrupted.
+const std::string kLong = kPath + " -o a.exr --spp 1000000000";
+
+/// Runs a tool in the background.
+class Background {
+ public:
+  Background(const SceneFolder& folder, const std::string& arguments) : process_(fork()) {
+    if (process_ != 0) return;
+    // A shell would ignore SIGINT in its background jobs.
+    std::signal(SIGINT, SIG_DFL);
+    const std::string command =
+        "cd '" + folder.path().string() + "' && exec " LOBE_BIN_DIR "/" + arguments + " >out 2>error";
+    execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
+    _exit(127);
+  }
+  Background(const Background&) = delete;
+  Background& operator=(const Background&) = delete;
+  ~Background() {
+    if (running_) send(SIGKILL), wait();
+  }
+
+  void send(int signal) const { kill(process_, signal); }
+  /// The exit code, or −1 if it was ended by a signal.
+  int wait() {
+    int status = 0;
+    waitpid(process_, &status, 0);
+    running_ = false;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+
+ private:
+  pid_t process_;
+  bool running_ = true;
+};
+
+/// Waits until the condition holds; fails the test after a long time.
+template <class Condition>
+void waitFor(const Condition& condition) {
+  for (int i = 0; i < 6000 && !condition(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  REQUIRE(condition());
+}
+
+/// Hidden files are temporary files.
+long hiddenFiles(const fs::path& folder) {
+  return std::ranges::count_if(fs::directory_iterator(folder),
+                               [](const auto& entry) { return entry.path().filename().string().starts_with("."); });
+}
+
+ImageAttributes attributesOf(const SceneFolder& folder, const std::string& name) {
+  return readAttributes(folder / name);
+}
+
+std::string runIn(const SceneFolder& folder, const std::string& shell) {
+  const std::string command = "cd '" + folder.path().string() + "' && " + shell;
+  const int status = std::system(command.c_str());
+  return WIFEXITED(status) ? std::to_string(WEXITSTATUS(status)) : "signal";
+}
+
+/// A scene for which a note is printed after reading.
+std::string sceneWithNote() {
+  std::string text = kScene;
+  return text.insert(text.find("<sensor"), "<integrator type=\"volpath\"/>");
+}
+
+const std::string kBin = LOBE_BIN_DIR "/";
+
+}  // namespace
+
+TEST_CASE("tools: a full or closed standard error loses nothing") {
+  const SceneFolder folder(false);
+  folder.write("noted.xml", sceneWithNote());
+  const std::string render = kBin + "loberender noted.xml --integrator path --spp 1 -o ";
+  CHECK(runIn(folder, render + "full.exr 2>/dev/full") == "0");
+  CHECK(runIn(folder, render + "closed.exr 2>&-") == "0");
+  CHECK(runIn(folder, render + "all.exr <&- >&- 2>&-") == "0");
+  CHECK(runIn(folder, "(" + render + "pipe.exr; echo $? >code) 2>&1 | true; grep -q 0 code") == "0");
+  for (const char* name : {"full.exr", "closed.exr", "all.exr", "pipe.exr"})
+    CHECK(folder.bytes(name) == folder.bytes("full.exr"));
+  CHECK(runIn(folder, kBin + "loberender none.xml -o a.exr --spp 1 2>/dev/full") == "1");
+  CHECK(runIn(folder, kBin + "loberender --none 2>/dev/full") == "2");
+  CHECK(runIn(folder, kBin + kQuickFit + " >/dev/null 2>/dev/full") == "0");
+  CHECK(runIn(folder, kBin + kQuickFit + " --force >/dev/null 2>&-") == "0");
+}
+
+TEST_CASE("tools: help and results that cannot be printed are errors") {
+  const SceneFolder folder(true);
+  for (const std::string tool : {"loberender", "lobefit", "lobedump", "lobecompare"})
+    for (const std::string option : {" --help", " --version"}) {
+      CAPTURE(tool, option);
+      CHECK(runIn(folder, kBin + tool + option + " >/dev/full 2>/dev/null") == "1");
+      CHECK(runIn(folder, kBin + tool + option + " >&- 2>/dev/null") == "1");
+      CHECK(runIn(folder, kBin + tool + option + " >/dev/null") == "0");
+    }
+  CHECK(runIn(folder, kBin + "lobedump lobes/*.lobe >/dev/full 2>/dev/null") == "1");
+}
+
+TEST_CASE("tools: end quietly when the reader of their output has ended") {
+  const SceneFolder folder(false);
+  // The other side of the pipe is closed before anything is printed.
+  CHECK(runIn(folder, "{ sleep 0.3; " + kBin + "lobefit --help 2>error; echo $? >code; } | true; grep -q 141 code") ==
+        "0");
+  CHECK(folder.bytes("error").empty());
+}
+
+TEST_CASE("tools: a wrong name of a value is one line with the permitted names") {
+  const SceneFolder folder(false);
+  for (const auto& [option, names] :
+       {std::pair("--sampler", "sobol, independent"), std::pair("--russian-roulette", "throughput, adjoint"),
+        std::pair("--integrator", "path, guided, product"), std::pair("--bsdf-fraction", "fixed, learnt"),
+        std::pair("--train", "both, paths, photons")}) {
+    const std::string line = fault(folder, kRender + " " + option + " bogus", 2);
+    CHECK_THAT(line, Contains(std::string(option) + ": must be one of " + names + ", not 'bogus'"));
+    CHECK_THAT(fault(folder, kRender + " " + option + " 1", 2), Contains("must be one of"));
+  }
+}
+
+TEST_CASE("loberender: outputs beyond the file size limit are errors, and leave no temporary files") {
+  const SceneFolder folder(true);
+  // The limit lets the statistics through, but neither the pictures nor the illumination.
+  const std::string render = kBin + "loberender scene.xml -o a.exr -o b.png --stats s.json --spp 1 --size 200x150" +
+                             kTraining + " --save-illumination a.illum";
+  CHECK(runIn(folder, "ulimit -f 8; " + render + " 2>error") == "1");
+  const std::string errors = folder.bytes("error");
+  CAPTURE(errors);
+  for (const char* name : {"a.exr", "b.png", "a.illum"}) {
+    CHECK_THAT(errors, Contains(std::string("loberender: error: ") + name + ": cannot write: File too large"));
+    CHECK_FALSE(folder.has(name));
+  }
+  CHECK(nlohmann::json::parse(folder.bytes("s.json"))["spp"] == 1);
+  CHECK(hiddenFiles(folder.path()) == 0);
+}
+
+TEST_CASE("tools: names of any length and any bytes") {
+  const SceneFolder folder(false);
+  for (const std::size_t length : {244u, 245u, 251u, 255u}) {
+    const std::string name = std::string(length - 4, 'x') + ".exr";
+    CHECK(folder.run(kPath + " --spp 1 -o " + name).code == 0);
+    CHECK(folder.has(name));
+  }
+  CHECK_THAT(fault(folder, kPath + " --spp 1 -o " + std::string(252, 'x') + ".exr", 1), Contains("too long"));
+  REQUIRE(folder.run(kPath + " --spp 1 -o a.exr").code == 0);
+  const std::string odd = "b\xff.exr";
+  fs::copy(folder / "a.exr", folder / odd);
+  const ToolRun compare = folder.run("lobecompare a.exr " + odd + " --json");
+  CHECK(compare.code == 0);
+  CHECK(nlohmann::json::parse(compare.out)[0]["image"] == "b\xef\xbf\xbd.exr");
+}
+
+TEST_CASE("tools: a pipe as an input is an error and does not block") {
+  const SceneFolder folder(false);
+  REQUIRE(folder.run(kPath + " --spp 1 -o a.exr").code == 0);
+  for (const char* name : {"p.exr", "p.png", "p.lobe", "p.xml"}) REQUIRE(mkfifo((folder / name).c_str(), 0600) == 0);
+  for (const std::string command :
+       {"lobecompare a.exr p.exr", "lobecompare a.exr p.png", "lobecompare a.exr p.exr --merge c.exr",
+        "lobedump p.lobe", "loberender p.xml -o b.exr --spp 1",
+        "loberender scene.xml --illumination p.lobe -o b.exr --spp 1",
+        "loberender scene.xml --resume p.lobe -o b.exr --spp 1", "lobefit p.xml"}) {
+    CAPTURE(command);
+    CHECK(runIn(folder, "timeout 20 " + kBin + command + " 2>/dev/null") == "1");
+  }
+}
+
+TEST_CASE("tools: no output replaces a file that the run reads") {
+  const SceneFolder folder(true);
+  REQUIRE(folder.run(kRender).code == 0);
+  REQUIRE(folder.run("loberender scene.xml -o wall.png --spp 1 --integrator path").code == 0);
+  folder.write("floor.xml",
+               "<scene version=\"0.6.0\"><bsdf type=\"diffuse\" id=\"floor\"><texture name=\"reflectance\" "
+               "type=\"bitmap\"><string name=\"filename\" value=\"wall.png\"/></texture></bsdf></scene>");
+  folder.write("plane.obj", "v -1 0 -1\nv 1 0 -1\nv 0 0 1\nf 1 2 3\nmtllib plane.mtl\n");
+  folder.write("plane.mtl", "newmtl a\nKd 1 1 1\n");
+  std::string text = kScene;
+  text.insert(text.find("<sensor"), "<include filename=\"floor.xml\"/>");
+  text.insert(text.find("<shape"), "<shape type=\"obj\"><string name=\"filename\" value=\"plane.obj\"/></shape>");
+  folder.write("scene.xml", text);
+  fs::create_symlink("wall.png", folder / "link.png");
+  const std::string cache = fs::relative(folder.caches().front(), folder.path()).string();
+  const std::string render = "loberender scene.xml --spp 1" + kTraining;
+  for (const std::string output :
+       {"-o wall.png", "-o link.png", "-o ./lobes/../wall.png", "-o a.exr --stats plane.obj",
+        "-o a.exr --stats floor.xml", "-o a.exr --stats plane.mtl", "-o a.exr --checkpoint scene.xml"})
+    CHECK_THAT(fault(folder, render + " " + output, 2), Contains("would be overwritten"));
+  CHECK_THAT(fault(folder, render + " -o a.exr --stats " + cache, 2), Contains("would be overwritten"));
+  fs::copy(folder / "a.exr", folder / "b.exr");
+  fs::rename(folder / "b.exr", folder / "b.png");  // an EXR is recognised by its content
+  const std::string before = folder.bytes("b.png");
+  CHECK(folder.run("lobecompare a.exr b.png --map b.png").code == 2);
+  CHECK(folder.run("lobecompare b.png a.exr --map b.png").code == 2);
+  CHECK(folder.bytes("b.png") == before);
+  CHECK(folder.run("lobedump " + cache + " --scene scene.xml --plot wall.png").code == 2);
+}
+
+TEST_CASE("loberender: an interrupted render writes the picture so far") {
+  for (const auto& [signal, code] : {std::pair(SIGINT, 130), std::pair(SIGTERM, 143)}) {
+    const SceneFolder folder(false);
+    Background render(folder, kLong + " -o b.png --stats s.json --snapshot-every 0.1 --checkpoint run.ckpt");
+    waitFor([&] { return folder.has("s.json"); });  // a snapshot
+    render.send(signal);
+    CHECK(render.wait() == code);
+    CHECK_THAT(folder.bytes("error"),
+               Contains("loberender: interrupted: ") &&
+                   Contains(" of 1000000000 samples per pixel are rendered and written; --resume run.ckpt"));
+    CHECK(readImage(folder / "a.exr").width == 16);
+    CHECK(readImage(folder / "b.png").width == 16);
+    CHECK(nlohmann::json::parse(folder.bytes("s.json"))["spp"] > 0);
+    const ImageAttributes attributes = attributesOf(folder, "a.exr");
+    CHECK(attributes.contains("samples") != attributes.contains("interrupted"));
+    CHECK(hiddenFiles(folder.path()) == 0);
+  }
+}
+
+TEST_CASE("loberender: an interruption before the first sample writes nothing") {
+  const SceneFolder folder(true);
+  folder.write("noted.xml", sceneWithNote());
+  Background render(folder, "loberender noted.xml -o a.exr --spp 4 --passes 1000000 --checkpoint run.ckpt");
+  waitFor([&] { return folder.bytes("error").find("note: ") != std::string::npos; });  // the scene is read
+  const std::set<std::string> before = folder.names();
+  render.send(SIGTERM);
+  CHECK(render.wait() == 143);
+  CHECK_THAT(folder.bytes("error"), Contains("loberender: interrupted: before the first sample"));
+  CHECK(folder.names() == before);
+  CHECK_FALSE(folder.has("a.exr"));
+}
+
+TEST_CASE("lobefit: an interruption keeps the caches that are complete") {
+  const SceneFolder folder(false);
+  Background fit(folder, "lobefit scene.xml --elevations 100000");
+  waitFor([&] { return folder.has("lobes"); });
+  fit.send(SIGINT);
+  CHECK(fit.wait() == 130);
+  CHECK_THAT(folder.bytes("error"), Contains("lobefit: interrupted: 0 of 2 caches are complete; the same command"));
+  CHECK(folder.caches().empty());
+}
+
+TEST_CASE("loberender: a second interruption ends at once") {
+  const SceneFolder folder(false);
+  Background render(folder, kLong + " --snapshot-every 0.1");
+  waitFor([&] { return folder.has("a.exr"); });
+  for (int i = 0; i < 2; ++i) render.send(SIGTERM);
+  const int code = render.wait();
+  CHECK((code == -1 || code == 143));
+  CHECK(readImage(folder / "a.exr").width == 16);
+}
+
+TEST_CASE("loberender: a resumed render has the bytes of an uninterrupted one") {
+  const SceneFolder folder(true);
+  for (const std::string integrator : {"path", "guided", "product"}) {
+    const std::string render =
+        "loberender scene.xml --size 32x24 --integrator " + integrator + (integrator == "path" ? "" : kTraining);
+    REQUIRE(folder.run(render + " --spp 6 -o whole.exr --stats whole.json").code == 0);
+    REQUIRE(folder.run(render + " --spp 2 -o part.exr --checkpoint run.ckpt").code == 0);
+    const ToolRun resumed = folder.run(
+        render + " --spp 6 -o part.exr --stats part.json --checkpoint run.ckpt --resume run.ckpt --threads 1");
+    CAPTURE(resumed.error);
+    REQUIRE(resumed.code == 0);
+    CHECK_THAT(resumed.error, Contains("run.ckpt: continues with sample 3 of each pixel"));
+    CHECK(folder.bytes("part.exr") == folder.bytes("whole.exr"));
+    const auto whole = nlohmann::json::parse(folder.bytes("whole.json")),
+               part = nlohmann::json::parse(folder.bytes("part.json"));
+    for (const char* key : {"rays", "spp", "training_particles", "records", "strategy_fractions", "guiding_decisions"})
+      CHECK(whole[key] == part[key]);
+    CHECK(folder.run(render + " --spp 6 -o again.exr --resume run.ckpt").code == 0);
+    CHECK(folder.bytes("again.exr") == folder.bytes("whole.exr"));
+    CHECK_THAT(fault(folder, render + " --spp 5 -o part.exr --resume run.ckpt", 1), Contains("more than --spp 5"));
+  }
+}
+
+TEST_CASE("loberender: a checkpoint of another run is refused") {
+  const SceneFolder folder(true);
+  const std::string render = "loberender scene.xml -o a.exr --spp 2" + kTraining;
+  REQUIRE(folder.run(render + " --checkpoint run.ckpt").code == 0);
+  REQUIRE(folder.run(render + " --save-illumination a.illum").code == 0);
+  std::string other = kScene;
+  other.replace(other.find("value=\"5\"/></emitter>"), 9, "value=\"6\"");
+  folder.write("other.xml", other);
+  const auto refusal = [&](const std::string& command) { return fault(folder, command + " --resume run.ckpt", 1); };
+  for (const auto& [options, what] : std::vector<std::pair<std::string, std::string>>{
+           {" --integrator guided", "--integrator was product, and is guided now"},
+           {" --size 8x8", "the size was 16x12, and is 8x8 now"},
+           {" --seed 2", "--seed was 1, and is 2 now"},
+           {" --sampler independent", "--sampler was sobol"},
+           {" --max-depth 3", "--max-depth was"},
+           {" --reduction 0.1", "--reduction was 0"},
+           {" --components 4", "--components was 8"}})
+    CHECK_THAT(refusal(render + options), Contains("run.ckpt: a checkpoint of another run: ") && Contains(what));
+  CHECK_THAT(refusal("loberender other.xml -o a.exr --spp 2" + kTraining),
+             Contains("the hash of scene and camera was"));
+  CHECK_THAT(refusal("loberender scene.xml -o a.exr --spp 2 --illumination a.illum"), Contains("another run"));
+  CHECK_THAT(fault(folder, render + " --resume a.exr", 2), Contains("used for more than one file"));
+  CHECK_THAT(fault(folder, render + " --resume a.illum", 1), Contains("a Lobe file of kind 'ILLU', expected 'CKPT'"));
+  folder.write("run.ckpt", folder.bytes("run.ckpt").substr(0, 5000));
+  CHECK_THAT(refusal(render), Contains("run.ckpt: truncated"));
+}
