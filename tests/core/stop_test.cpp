@@ -56,7 +56,8 @@ TEST_CASE("core: stopped work does not look complete, whichever loop it is in") 
       };
       try {
         stoppable(stop, "stopped early", work);
-        CHECK(after);  // every iteration had begun before the loops were cancelled
+        CHECK(after);
+        CHECK(calls == kCount);  // every iteration had begun before the loops were cancelled
       } catch (const Stopped& e) {
         CHECK(e.what() == std::string("stopped early"));
         CHECK_FALSE(after);
