@@ -389,19 +389,21 @@ void drawRecord(const RenderJob& job, const RenderScene& scene, const Receiver& 
   training.particles = {};  // not needed any more; frees memory for rendering
 }
 
-/// Learning the counts of samples takes a few percent of the time for rendering.
-int pathsForSampleCounts(const RenderJob& job, const RayCamera& camera) {
-  constexpr double kFraction = 0.05, kPathsPerSecond = 7000, kFewest = 30000, kMost = 200000;
-  const double wanted =
-      job.seconds ? kPathsPerSecond * *job.seconds : kFraction * *job.samples * camera.width() * camera.height();
-  return static_cast<int>(std::clamp(wanted, kFewest, kMost));
+/// The fraction of a full-sized pilot, and of the paths for learning counts, that suits a run: both shall take a few
+/// percent of the time of rendering.
+double preparationSize(const RenderJob& job, const RayCamera& camera) {
+  constexpr double kLeast = 0.2, kSeconds = 10, kPaths = 3e6;
+  const double size = job.seconds ? *job.seconds / kSeconds
+                                  : static_cast<double>(*job.samples) * camera.width() * camera.height() / kPaths;
+  return std::clamp(size, kLeast, 1.0);
 }
 
 void learnCounts(const RenderJob& job, const RenderScene& scene, const RayCamera& camera, const PathOptions& options,
                  Guiding& guiding) {
+  constexpr double kPaths = 100000;
   const Stopwatch watch;
   guiding.counts = learnSampleCounts(scene, camera, options, *guiding.sampler, guiding.training.field.records(),
-                                     pathsForSampleCounts(job, camera), job.seed);
+                                     static_cast<int>(kPaths * preparationSize(job, camera)), job.seed);
   guiding.secondsCounts = watch.seconds();
 }
 
@@ -424,8 +426,12 @@ std::unique_ptr<Integrator> makeIntegrator(const RenderJob& job, const RenderSce
   auto guided = std::make_unique<GuidedIntegrator>(scene, options, *guiding.sampler);
   if (job.integrator != IntegratorKind::automatic) return guided;
   const Stopwatch watch;
-  const auto results =
-      comparePilots(camera, std::array<const Integrator*, 2>{path.get(), guided.get()}, {.seed = job.seed});
+  PilotOptions pilot;
+  pilot.tiles = static_cast<int>(pilot.tiles * preparationSize(job, camera));
+  pilot.seed = job.seed;
+  // The same picture for a seed is only promised for --spp.
+  pilot.timed = job.seconds.has_value();
+  const auto results = comparePilots(camera, std::array<const Integrator*, 2>{path.get(), guided.get()}, pilot);
   guiding.pilot = {results[0], results[1], watch.seconds()};
   if (guiding.pilot->best() == IntegratorKind::path) return path;
   return guided;

@@ -136,8 +136,8 @@ TEST_CASE("tools: end quietly when the reader of their output has ended") {
 TEST_CASE("tools: a wrong name of a value is one line with the permitted names") {
   const SceneFolder folder(false);
   for (const auto& [option, names] :
-       {std::pair("--sampler", "sobol, independent"), std::pair("--russian-roulette", "throughput, adjoint"),
-        std::pair("--integrator", "path, guided, product"), std::pair("--bsdf-fraction", "fixed, learnt"),
+       {std::pair("--sampler", "sobol, independent"), std::pair("--russian-roulette", "throughput, efficiency"),
+        std::pair("--integrator", "auto, path, guided, product"), std::pair("--bsdf-fraction", "fixed, learnt"),
         std::pair("--train", "both, paths, photons")}) {
     const std::string line = fault(folder, kRender + " " + option + " bogus", 2);
     CHECK_THAT(line, Contains(std::string(option) + ": must be one of " + names + ", not 'bogus'"));
@@ -306,7 +306,7 @@ TEST_CASE("loberender: a checkpoint of another run is refused") {
   folder.write("other.xml", other);
   const auto refusal = [&](const std::string& command) { return fault(folder, command + " --resume run.ckpt", 1); };
   for (const auto& [options, what] : std::vector<std::pair<std::string, std::string>>{
-           {" --integrator guided", "--integrator was product, and is guided now"},
+           {" --integrator guided", "--integrator was auto, and is guided now"},
            {" --size 8x8", "the size was 16x12, and is 8x8 now"},
            {" --seed 2", "--seed was 1, and is 2 now"},
            {" --sampler independent", "--sampler was sobol"},

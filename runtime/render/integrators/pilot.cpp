@@ -8,6 +8,7 @@
 #include "runtime/core/parallel.h"
 #include "runtime/core/random.h"
 #include "runtime/core/statistics.h"
+#include "runtime/core/stopwatch.h"
 
 namespace lobe {
 namespace {
@@ -54,6 +55,7 @@ PixelPair renderPair(const RayCamera& camera, const Integrator& integrator, std:
                      const PilotOptions& options) {
   PixelPair pair;
   PathStatistics statistics;
+  const Stopwatch watch;
   const auto width = static_cast<std::uint64_t>(camera.width());
   for (std::size_t picture = 0; picture < 2; ++picture) {
     const std::uint64_t seed = Rng(options.seed, kTag, picture).next();
@@ -63,7 +65,7 @@ PixelPair renderPair(const RayCamera& camera, const Integrator& integrator, std:
       pair.means[picture] += luminance(integrator.radiance(ray, rng, statistics)) / options.samples;
     }
   }
-  pair.cost = statistics.cost() / (2.0 * options.samples);
+  pair.cost = (options.timed ? watch.seconds() : statistics.cost()) / (2.0 * options.samples);
   return pair;
 }
 

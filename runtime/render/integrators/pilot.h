@@ -14,6 +14,9 @@ struct PilotOptions {
   int tiles = 128;  ///< of 4×4 pixels, at most; spread over the image
   int samples = 8;  ///< per pixel, for each of the two independent pictures that are compared
   std::uint64_t seed = 1;
+  /// Whether costs are measured in seconds. Otherwise they are PathStatistics::cost, and the results do not depend on
+  /// the machine and the number of threads.
+  bool timed = false;
 };
 
 struct PilotResult {
@@ -21,12 +24,12 @@ struct PilotResult {
   /// without the worst 0.5 % of the pixels. m is the mean of the pixel's tile over all integrators, because that of the
   /// pixel would be too noisy, and the median is that of the tiles.
   double variance = 0;
-  double cost = 0;  ///< of a sample, PathStatistics::cost
+  double cost = 0;  ///< of a sample
   /// The relative variance of a picture times the time it takes.
   double inefficiency() const { return variance * cost; }
 };
 
-/// The results in the order of the integrators. They do not depend on the number of threads.
+/// The results in the order of the integrators.
 std::vector<PilotResult> comparePilots(const RayCamera& camera, std::span<const Integrator* const> integrators,
                                        const PilotOptions& options);
 
