@@ -232,18 +232,17 @@ class PathLoop {
 
   // One sample of next-event estimation: the light that is scattered at the vertex, without the path's throughput.
   Rgb directLight(const Path& path, const Scattering& at, Sampler& rng) const {
-    const Rgb none = Rgb::Zero();
     const SurfaceHit& hit = at.hit;
     const double choice = rng.stratifiedDouble();
     const std::optional<LightSample> light = at.lights.sample(choice, rng.stratified2());
-    if (!light) return none;
+    if (!light) return Rgb::Zero();
     const Vec3 wi = hit.frame.toLocal(light->wi);
-    if (!sidesAgree(hit, light->wi, wi)) return none;
+    if (!sidesAgree(hit, light->wi, wi)) return Rgb::Zero();
     const Rgb f = evalBsdf(hit, wi);
-    if (!(f.maxCoeff() > 0.0f)) return none;
+    if (!(f.maxCoeff() > 0.0f)) return Rgb::Zero();
     const ArrivingLight arriving = scene_.arriving(hit, *light, options_.maxDepth - path.depth - 1);
     path.statistics->shadowRays += static_cast<std::uint64_t>(arriving.rays);
-    if (!(arriving.radiance.maxCoeff() > 0.0f)) return none;
+    if (!(arriving.radiance.maxCoeff() > 0.0f)) return Rgb::Zero();
     const float weight = light->delta ? 1.0f : misWeight(light->pdf, (1.0f - at.delta) * at.vertex.pdf(wi));
     return f * arriving.radiance * (std::abs(wi.z()) * weight / light->pdf);
   }

@@ -131,6 +131,7 @@ void Lights::choose(const std::vector<double>& powers) {
     shining += power > 0;
   }
   std::vector<float> weights;
+  weights.reserve(powers.size());
   for (const double power : powers)
     weights.push_back(power > 0 ? static_cast<float>((1 - kUniformFraction) * power / total +
                                                      kUniformFraction / static_cast<double>(shining))
@@ -223,6 +224,7 @@ LightBounds Lights::boundsForTree(int light, double power) const {
 void Lights::makeClusters(const std::vector<double>& powers) {
   const auto localLights = static_cast<int>(areas_.size() + scene_.lights.size());
   std::vector<LightBounds> bounds;
+  bounds.reserve(localLights);
   for (int i = 0; i < localLights; ++i) bounds.push_back(boundsForTree(i, powers[i]));
   tree_ = LightTree(bounds);
   clusterOf_.assign(localLights, -1);
