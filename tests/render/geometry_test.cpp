@@ -105,7 +105,8 @@ TEST_CASE("render: light does not leak through a floor from just below it") {
   Sampler rng(1);
   for (int i = 0; i < 1000; ++i) {
     const double choice = rng.uniformDouble();
-    const auto light = ready.lights.at(LightReceiver{Vec3(0.3f, 0.5f, 0.2f), Vec3::Zero()}).sample(choice, rng.uniform2());
+    const auto light =
+        ready.lights.at(LightReceiver{Vec3(0.3f, 0.5f, 0.2f), Vec3::Zero()}).sample(choice, rng.uniform2());
     REQUIRE(light);
     SurfacePoint above = floor;
     above.position.y() += 0.5f;

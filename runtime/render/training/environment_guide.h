@@ -39,9 +39,9 @@ class EnvironmentGuide {
 
   const Lights& lights_;
   const EnvironmentLight& environment_;
-  std::vector<float> weights_;       // by block, then cell
-  std::vector<int> bins_;  // the positive weights, in the order in which they were reached
-  DiscreteDistribution choice_;      // over bins_
+  std::vector<float> weights_;   // by block, then cell
+  std::vector<int> bins_;        // the positive weights, in the order in which they were reached
+  DiscreteDistribution choice_;  // over bins_
 };
 
 }  // namespace lobe
