@@ -412,6 +412,112 @@ TEST_CASE("render: photons carry the same flux as light sampling") {
   checkPhotons(scene);
 }
 
+namespace {
+
+// The mean of 1/density over photons: the measure of the points and directions from which the only light of the scene
+// emits.
+Moments measureOfPhotons(const Scene& scene) {
+  const RenderScene ready(scene);
+  Moments measure;
+  Rng rng(3);
+  for (int i = 0; i < 100000; ++i) {
+    const double choice = rng.uniformDouble();
+    const Vec2 u1 = rng.uniform2();
+    const auto photon = ready.lights.samplePhoton(choice, u1, rng.uniform2());
+    measure.add(photon ? 1 / photon->density : 0);
+  }
+  return measure;
+}
+
+}  // namespace
+
+TEST_CASE("render: the density of photons integrates to one over all points and directions") {
+  Scene scene;
+  double expected = 0;
+  // The radius of the sphere around the scene is 1, and its disc has the area π.
+  addShape(scene, Sphere{{0, 0, 0}, 1 / std::sqrt(3.0f)}, addMaterial(scene, std::make_shared<Diffuse>(0.5f)));
+  SECTION("sphere") {
+    scene.shapes[0].emitter = AreaEmitter{constantTexture(grey(1))};
+    expected = 4 * M_PI / 3 * 2 * M_PI;
+  }
+  SECTION("constant environment") {
+    scene.environment = environment(Image(1, 1, grey(1)));
+    expected = 4 * M_PI * M_PI;
+  }
+  SECTION("environment") {
+    scene.environment = environment(sunnySky());
+    expected = 4 * M_PI * M_PI;
+  }
+  SECTION("point") {
+    scene.lights.push_back(PointLight{{0.5f, 1, 0.2f}, grey(2)});
+    expected = 4 * M_PI;
+  }
+  SECTION("spot") {
+    scene.lights.push_back(SpotLight{{0.5f, 1, 0.2f}, -Vec3::UnitY(), grey(2), 0.6f, 0.2f});
+    expected = 2 * M_PI * (1 - std::cos(0.6));
+  }
+  SECTION("projector") {
+    // A square pyramid with the height 1 over a base of 1 by 1.
+    const auto image = constantTexture(grey(1));
+    scene.lights.push_back(ProjectorLight{{0, 2, 0}, -Vec3::UnitY(), 1, {image, Vec3::UnitX(), Vec3::UnitZ()}});
+    expected = 4 * std::asin(0.25 / 1.25);
+  }
+  SECTION("directional") {
+    scene.lights.push_back(DirectionalLight{-Vec3::UnitY(), grey(2)});
+    expected = M_PI;
+  }
+  CHECK(deviation(measureOfPhotons(scene), expected) < kMaxDeviation);
+}
+
+TEST_CASE("render: light samples and hits on lights have the densities of photons") {
+  std::vector<LightCase> cases = lightCases();
+  Scene& delta = cases.emplace_back(LightCase{"delta lights", {}, {0, 0, 0}}).scene;
+  addShape(delta, Disk{{0, -1, 0}, {0, 0, 2}, {2, 0, 0}}, addMaterial(delta, std::make_shared<Diffuse>(0.5f)));
+  delta.lights = {
+      PointLight{{0.5f, 1, 0.2f}, grey(2)}, DirectionalLight{-Vec3::UnitY(), grey(2)},
+      SpotLight{{0.5f, 1, 0.2f}, -Vec3::UnitY(), grey(2), 1.2f, 0.2f},
+      ProjectorLight{{0, 2, 0}, -Vec3::UnitY(), 1, {constantTexture(grey(1)), Vec3::UnitX(), Vec3::UnitZ()}}};
+  for (const LightCase& c : cases) {
+    CAPTURE(c.name);
+    const RenderScene ready(c.scene);
+    Rng rng(4);
+    int differing = 0, compared = 0;
+    const auto compare = [&](float a, float b) { ++compared, differing += !(std::abs(a - b) <= 1e-2f * b); };
+    for (int i = 0; i < 3000; ++i) {
+      // The point that next-event estimation finds, as the origin of a photon.
+      const double choice = rng.uniformDouble();
+      const LightSelection nextEvent = ready.lights.at(anySide(c.point));
+      const auto light = nextEvent.sample(choice, rng.uniform2());
+      if (!light) continue;
+      EmittedPhoton photon;
+      photon.far = !light->source;
+      photon.delta = light->delta;
+      photon.light = light->light;
+      photon.normal = light->source ? light->source->normal : Vec3(Vec3::Zero());
+      photon.ray = {light->source ? light->source->position : Vec3(Vec3::Zero()), -light->wi};
+      const bool point = light->delta && light->source;
+      compare(nextEvent.pdf(photon, light->distance), light->pdf * (point ? light->distance * light->distance : 1));
+      if (light->delta) continue;
+      const auto hit = ready.tracer.trace({c.point, light->wi});
+      if (hit.has_value() == light->source.has_value())
+        compare(hit ? ready.lights.photonDensity(*hit) : ready.lights.environmentPhotonDensity(light->wi),
+                ready.lights.photonDensity(*light));
+    }
+    for (int i = 0; i < 3000; ++i) {
+      // A photon, as a sample of next-event estimation.
+      const double choice = rng.uniformDouble();
+      const Vec2 u1 = rng.uniform2();
+      const auto photon = ready.lights.samplePhoton(choice, u1, rng.uniform2());
+      if (!photon) continue;
+      LightSample light{-photon->ray.direction, 1, photon->power, 1, std::nullopt, photon->delta, photon->light};
+      if (!photon->far) light.source = SurfacePoint{photon->ray.origin, photon->normal, {0, 0}, 0};
+      compare(ready.lights.photonDensity(light), photon->density);
+    }
+    CHECK(compared > 3000);
+    CHECK(differing <= 10);  // grazing rays
+  }
+}
+
 TEST_CASE("render: projectors and textured spot lights project their images") {
   // The irradiance of a floor at distance 2 below the light.
   const auto irradiance = [](const DeltaLight& light, const Vec3& at) {

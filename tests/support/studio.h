@@ -5,8 +5,8 @@
 
 #include "fitter/compile.h"
 #include "runtime/guiding/field_data.h"
+#include "runtime/render/integrators/bidirectional_integrator.h"
 #include "runtime/render/integrators/learn_sample_counts.h"
-#include "runtime/render/integrators/path_integrator.h"
 #include "runtime/render/integrators/renderer.h"
 #include "runtime/render/training/training.h"
 #include "scenes/camera.h"
@@ -39,8 +39,11 @@ class Studio {
     plan.photons = 20000;
     plan.importons = 8000;
     plan.seed = 5;
-    illumination_ = trainIllumination(*renderScene_, *camera_, &*caches_, plan).field;
+    plan.keepImportance = true;
+    const TrainedIllumination trained = trainIllumination(*renderScene_, *camera_, &*caches_, plan);
+    illumination_ = trained.field, importance_ = trained.importance;
     guided_.emplace(scene_, illumination_, nullptr);
+    importanceSampler_.emplace(scene_, importance_, nullptr);
     product_.emplace(scene_, illumination_, &*caches_);
     guidedCounts_ = countsFor(*guided_);
     productCounts_ = countsFor(*product_);
@@ -56,10 +59,15 @@ class Studio {
   GuidedIntegrator guided() const { return {*renderScene_, with(*guidedCounts_), *guided_}; }
   GuidedIntegrator product() const { return {*renderScene_, with(*productCounts_), *product_}; }
   GuidedIntegrator productWithThroughputRoulette() const { return {*renderScene_, {}, *product_}; }
+  GuidedBdptIntegrator guidedBdpt() const { return {*renderScene_, *camera_, {}, *guided_, *importanceSampler_}; }
+  GuidedBdptIntegrator productBdpt() const { return {*renderScene_, *camera_, {}, *product_, *importanceSampler_}; }
+  const RayCamera& camera() const { return *camera_; }
   const RenderScene& renderScene() const { return *renderScene_; }
   const Scene& scene() const { return scene_; }
   const GuidedSampler& productSampler() const { return *product_; }
+  const GuidedSampler& importanceSampler() const { return *importanceSampler_; }
   const IlluminationCache& illumination() const { return cacheOf(illumination_); }
+  const Field& importance() const { return importance_; }
   std::filesystem::path lobes() const { return folder_ / "lobes"; }
 
  private:
@@ -77,8 +85,8 @@ class Studio {
   std::optional<RenderScene> renderScene_;
   std::optional<RayCamera> camera_;
   std::optional<LobeCacheSet> caches_;
-  Field illumination_;
-  std::optional<GuidedSampler> guided_, product_;
+  Field illumination_, importance_;
+  std::optional<GuidedSampler> guided_, product_, importanceSampler_;
   std::optional<SampleCountModel> guidedCounts_, productCounts_;
 };
 

@@ -84,23 +84,41 @@ float FilterSampler::sample(float u) const {
   return filter_.radius * (2.0f * (static_cast<float>(interval) + u) / kIntervals - 1.0f);
 }
 
+float FilterSampler::density(float offset) const {
+  const float r = filter_.radius;
+  if (!(offset >= -r && offset < r)) return 0.0f;
+  switch (filter_.kind) {
+    case PixelFilter::Kind::box:
+      return 0.5f / r;
+    case PixelFilter::Kind::tent:
+      return (1.0f - std::abs(offset) / r) / r;
+    default:
+      break;
+  }
+  const int interval = std::min(static_cast<int>((offset / r + 1.0f) * (0.5f * kIntervals)), kIntervals - 1);
+  return intervals_.probability(interval) * (0.5f * kIntervals / r);
+}
+
 RayCamera::RayCamera(const Camera& camera, const PixelFilter& filter)
     : kind_(camera.kind), position_(camera.toWorld.topRightCorner<3, 1>()), filter_(filter) {
   check(camera);
   const FilmCrop picture = camera.picture();
   width_ = picture.width, height_ = picture.height;
-  const bool orthographic = kind_ == Camera::Kind::orthographic;
   const Eigen::Matrix3f toWorld = camera.toWorld.topLeftCorner<3, 3>();
   axis_ = toWorld.col(2).normalized();
   // The film plane is at distance 1; an orthographic film extends from −1 to 1.
-  const float half = orthographic ? 1.0f : std::tan(0.5f * camera.horizontalFov * kPi / 180.0f);
+  const float half = orthographic() ? 1.0f : std::tan(0.5f * camera.horizontalFov * kPi / 180.0f);
   const float pixel = 2.0f * half / camera.width;
   // +x is left: columns run towards −x, rows towards −y.
   right_ = toWorld * Vec3(-pixel, 0.0f, 0.0f);
   down_ = toWorld * Vec3(0.0f, -pixel, 0.0f);
-  corner_ = toWorld * Vec3(half, half * camera.height / camera.width, orthographic ? 0.0f : 1.0f);
+  corner_ = toWorld * Vec3(half, half * camera.height / camera.width, orthographic() ? 0.0f : 1.0f);
   corner_ += (picture.x + camera.shift.x() * camera.width) * right_;
   corner_ += (picture.y + camera.shift.y() * camera.height) * down_;
+  Eigen::Matrix3d film;
+  film << right_.cast<double>(), down_.cast<double>(), (orthographic() ? axis_ : corner_).cast<double>();
+  toFilm_ = film.inverse().cast<float>();
+  pixel_ = right_.cross(down_);
   const float radius = kind_ == Camera::Kind::thinlens ? camera.apertureRadius : 0.0f;
   lensX_ = toWorld.col(0) * radius;
   lensY_ = toWorld.col(1) * radius;
@@ -117,7 +135,7 @@ Ray RayCamera::clipped(const Vec3& origin, const Vec3& direction) const {
 
 Ray RayCamera::rayThrough(const Vec2& point, const Vec2& lens) const {
   const Vec3 film = corner_ + point.x() * right_ + point.y() * down_;
-  if (kind_ == Camera::Kind::orthographic) return clipped(position_ + film, axis_);
+  if (orthographic()) return clipped(position_ + film, axis_);
   if (kind_ == Camera::Kind::perspective) return clipped(position_, film.normalized());
   const Vec3 offset = lens.x() * lensX_ + lens.y() * lensY_;
   return clipped(position_ + offset, (film - offset / focus_).normalized());
@@ -127,6 +145,32 @@ Ray RayCamera::sample(int x, int y, Sampler& rng) const {
   const Vec2 point = Vec2(x + 0.5f, y + 0.5f) + filter_.sample(rng.stratified2());
   if (kind_ != Camera::Kind::thinlens) return rayThrough(point);
   return rayThrough(point, squareToDisk(rng.stratified2()));
+}
+
+float RayCamera::density(const Ray& ray, float distance) const {
+  const float cosine = std::abs(pixel_.dot(ray.direction));
+  if (orthographic()) return 1.0f / cosine;
+  // The film plane is at distance 1 along corner_: `scale` times the direction points from the lens to it.
+  const float scale = 1.0f / toFilm_.row(2).dot(ray.direction);
+  const float fromLens = distance + near_ / ray.direction.dot(axis_);
+  return scale * scale / (cosine * fromLens * fromLens);
+}
+
+std::optional<CameraView> RayCamera::view(const Vec3& point, const Vec2& lens) const {
+  const Vec3 offset = hasLens() ? Vec3(lens.x() * lensX_ + lens.y() * lensY_) : Vec3(Vec3::Zero());
+  const Vec3 toPoint = point - position_ - (orthographic() ? corner_ : offset);
+  const Vec3 onFilm = toFilm_ * toPoint;
+  const float depth = orthographic() ? onFilm.z() : toPoint.dot(axis_);
+  if (!(depth > near_ && depth <= far_)) return std::nullopt;
+  CameraView view;
+  view.film = onFilm.head<2>();
+  if (!orthographic()) view.film = view.film / onFilm.z() + (toFilm_ * (offset / focus_)).head<2>();
+  const Eigen::Array2f size(width_, height_), margin = Eigen::Array2f::Constant(filter_.radius());
+  if (!(view.film.array() > -margin).all() || !(view.film.array() < size + margin).all()) return std::nullopt;
+  view.ray = rayThrough(view.film, lens);
+  view.ray.tfar = (point - view.ray.origin).norm();
+  view.density = density(view.ray, view.ray.tfar);
+  return view;
 }
 
 }  // namespace lobe

@@ -1,8 +1,10 @@
 #pragma once
-// Camera rays. Each sample contributes to one pixel: the reconstruction filter is importance sampled (Ernst et al.
-// 2006, "Filter Importance Sampling"), so that pixels are means of independent samples and need no splatting. Negative
-// lobes of filters are omitted, so that pixels are never negative: mitchell, catmullrom and lanczos give slightly
-// softer images than with splatting.
+// Camera rays, and the projection of points to the image. Each camera ray contributes to one pixel: the reconstruction
+// filter is importance sampled (Ernst et al. 2006, "Filter Importance Sampling"), so that pixels are means of
+// independent samples and need no splatting. Negative lobes of filters are omitted, so that pixels are never negative:
+// mitchell, catmullrom and lanczos give slightly softer images than with splatting.
+
+#include <optional>
 
 #include "runtime/core/distribution.h"
 #include "runtime/core/sampler.h"
@@ -18,11 +20,23 @@ class FilterSampler {
   explicit FilterSampler(const PixelFilter& filter);
   /// u uniform in [0,1)².
   Vec2 sample(const Vec2& u) const { return {sample(u.x()), sample(u.y())}; }
+  /// The density of sample, in pixels⁻².
+  float density(const Vec2& offset) const { return density(offset.x()) * density(offset.y()); }
+  /// The largest distance from the pixel's centre along each axis.
+  float radius() const { return filter_.radius; }
 
  private:
   float sample(float u) const;
+  float density(float offset) const;
   PixelFilter filter_;
   DiscreteDistribution intervals_;  // over equal intervals of [−radius, radius], for filters without closed form
+};
+
+/// A point of the scene as the camera sees it through a point of the lens.
+struct CameraView {
+  Vec2 film;      ///< image point in pixels
+  Ray ray;        ///< from the near clip plane to the point, at the distance tfar; unit direction
+  float density;  ///< RayCamera::density of the ray at the point
 };
 
 /// Generates the rays of a perspective (pinhole or thin lens) or orthographic camera.
@@ -42,8 +56,21 @@ class RayCamera {
   /// A random ray for the pixel in column x and row y, from a random point on the lens.
   Ray sample(int x, int y, Sampler& rng) const;
 
+  /// The density over area, perpendicular to the ray, of the rays through one point of the lens at a distance from the
+  /// ray's origin, if there is one ray per pixel area of the image (the importance of the camera, Veach 1997, Section
+  /// 8.3). ray: as returned by the functions above.
+  float density(const Ray& ray, float distance) const;
+
+  /// How a point is seen through the point `lens` of the unit disc; nullopt if it is behind the camera, outside the
+  /// clip planes, or too far outside the image to contribute to a pixel.
+  std::optional<CameraView> view(const Vec3& point, const Vec2& lens) const;
+
+  bool hasLens() const { return kind_ == Camera::Kind::thinlens; }
+  const FilterSampler& filter() const { return filter_; }
+
  private:
   Ray clipped(const Vec3& origin, const Vec3& direction) const;
+  bool orthographic() const { return kind_ == Camera::Kind::orthographic; }
 
   Camera::Kind kind_;
   int width_, height_;
@@ -52,6 +79,9 @@ class RayCamera {
   Vec3 corner_;        // from the position to the top left corner of the image on the film plane (not unit)
   Vec3 right_, down_;  // steps by one pixel on the film plane
   Vec3 lensX_, lensY_;
+  // Inverse of the matrix of right_, down_ and either corner_ or, for an orthographic camera, axis_.
+  Eigen::Matrix3f toFilm_;
+  Vec3 pixel_;        // right_ × down_, the area of a pixel on the film plane
   float focus_;       // focus distance: points at corner_ times this are in focus
   float near_, far_;  // clip planes, as distances along axis_ in world units
   FilterSampler filter_;

@@ -231,7 +231,22 @@ SurfaceHit makeSurfaceHit(const Scene& scene, const Ray& ray, const Hit& hit) {
   result.distance = hit.t;
   result.shape = static_cast<int>(hit.shape);
   result.material = shape.material;
+  result.intersection = hit;
   return result;
+}
+
+SurfaceHit asSeenFrom(const Scene& scene, const SurfaceHit& hit, const Vec3& direction) {
+  if (hit.bsdf && hit.bsdf->mapsNormals()) {
+    Hit here = hit.intersection;
+    here.t = 0.0f;
+    SurfaceHit seen = makeSurfaceHit(scene, {hit.position, -direction}, here);
+    seen.distance = hit.distance;
+    return seen;
+  }
+  SurfaceHit seen = hit;
+  seen.woWorld = direction;
+  seen.wo = seen.frame.toLocal(direction);
+  return seen;
 }
 
 Rgb evalBsdf(const SurfaceHit& hit, const Vec3& wi) {
@@ -254,6 +269,21 @@ std::optional<DeltaTransmission> deltaTransmission(const SurfaceHit& hit) {
   std::optional<DeltaTransmission> transmission = hit.bsdf->deltaTransmission(hit.wo, hit.uv);
   if (transmission) transmission->weight *= terminatorShadowing(hit, transmission->wi);
   return transmission;
+}
+
+Rgb evalAdjointBsdf(const SurfaceHit& hit, const SurfaceHit& seen) {
+  const Vec3 wi = seen.frame.toLocal(hit.woWorld);
+  if (!sidesAgree(seen, seen.woWorld, seen.wo) || !sidesAgree(seen, hit.woWorld, wi)) return Rgb::Zero();
+  return evalBsdf(seen, wi) * std::abs(wi.z() / hit.normal.dot(hit.woWorld));
+}
+
+std::optional<DeltaSample> sampleAdjointDelta(const SurfaceHit& hit, float choice) {
+  std::optional<DeltaSample> sample = hit.bsdf->sampleDelta(hit.wo, hit.uv, choice);
+  if (!sample) return std::nullopt;
+  const float in = std::abs(hit.wo.z() / hit.normal.dot(hit.woWorld));
+  const float out = std::abs(hit.normal.dot(hit.frame.toWorld(sample->wi)) / sample->wi.z());
+  sample->weight *= sample->eta * sample->eta * in * out * terminatorShadowing(hit, hit.wo);
+  return sample;
 }
 
 Rgb emittedRadiance(const SurfaceHit& hit) {

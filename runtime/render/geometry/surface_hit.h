@@ -38,6 +38,7 @@ struct SurfaceHit : SurfacePoint {
   int material;                ///< index into Scene::materials; −1 without bsdf
   const Bsdf* bsdf;            ///< nullptr: the surface absorbs everything
   const AreaEmitter* emitter;  ///< nullptr: not an emitter
+  Hit intersection;            ///< from which it was made
 };
 
 /// The point with barycentric weights (1−b1−b2, b1, b2) on a triangle.
@@ -53,12 +54,24 @@ SurfacePoint pointOnCylinder(const Cylinder& cylinder, float azimuth, float heig
 /// The surface interaction of an intersection. The direction of the ray must be unit.
 SurfaceHit makeSurfaceHit(const Scene& scene, const Ray& ray, const Hit& hit);
 
+/// The same surface point seen from another direction (unit, world space, away from the surface). The shading frame may
+/// differ, because the mapped normal may depend on the direction. The distance is kept.
+SurfaceHit asSeenFrom(const Scene& scene, const SurfaceHit& hit, const Vec3& direction);
+
 /// The BSDF at the hit, with the shadowing term for bump mapping, a factor that depends on wi (local in hit.frame).
 /// Estimators must use these functions instead of those of hit.bsdf. hit.bsdf must not be null.
 Rgb evalBsdf(const SurfaceHit& hit, const Vec3& wi);
 std::optional<BsdfSample> sampleBsdf(const SurfaceHit& hit, float choice, const Vec2& u);
 std::optional<DeltaSample> sampleDelta(const SurfaceHit& hit, float choice);
 std::optional<DeltaTransmission> deltaTransmission(const SurfaceHit& hit);
+
+/// For light that arrives along hit.wo, as on a path from a light: the BSDF for radiance that leaves in the direction
+/// of `seen.wo`, times |ω·Ns|/|ω·Ng| for the shading and the geometric normal and the direction ω of hit.wo, the
+/// correction without which paths from lights and from the camera would not agree (Veach 1997, Section 5.3.2). seen:
+/// asSeenFrom the direction in which the light leaves. Zero if a direction is on different sides of the two normals.
+Rgb evalAdjointBsdf(const SurfaceHit& hit, const SurfaceHit& seen);
+/// Like sampleDelta for such light: the weight is that of flux, with the same correction.
+std::optional<DeltaSample> sampleAdjointDelta(const SurfaceHit& hit, float choice);
 
 /// The radiance that the point emits towards the origin of the ray; black on the back side.
 Rgb emittedRadiance(const SurfaceHit& hit);

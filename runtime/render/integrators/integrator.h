@@ -6,9 +6,15 @@
 
 #include "lobe/surface_distribution.h"
 #include "runtime/core/sampler.h"
+#include "runtime/render/film/light_image.h"
 #include "runtime/render/geometry/ray.h"
+#include "runtime/render/integrators/photon_grid.h"
 
 namespace lobe {
+
+/// The quantity that a path carries: radiance against its direction (camera paths, importons), or flux along it (light
+/// paths, photons).
+enum class Transport { radiance, flux };
 
 /// Techniques that sample the next direction of a path, in the order of Strategy, then delta scattering.
 inline constexpr std::array<const char*, 4> kScatteringNames{"bsdf", "product", "illumination", "delta"};
@@ -53,6 +59,27 @@ class Integrator {
   virtual ~Integrator() = default;
   /// An unbiased estimate of the radiance that arrives along the ray. Called concurrently from many threads.
   virtual Rgb radiance(const Ray& ray, Sampler& rng, PathStatistics& statistics) const = 0;
+};
+
+/// An integrator whose light paths contribute to any pixel of the image.
+class BidirectionalIntegrator {
+ public:
+  virtual ~BidirectionalIntegrator() = default;
+  /// Whether all light paths of a sample are stored before its camera paths are traced. If so, the renderer calls
+  /// beginSample with the index of the sample, storeLightPath for every pixel, and mergeWith with all photons.
+  virtual bool storesLightPaths() const { return false; }
+  virtual void beginSample(int sample) { (void)sample; }
+  /// Appends the vertices of the light path that radiance traces with the same random numbers. Called concurrently.
+  virtual void storeLightPath(Sampler& lightRng, PathStatistics& statistics, std::vector<Photon>& photons) const {
+    (void)lightRng, (void)statistics, (void)photons;
+  }
+  virtual void mergeWith(const std::vector<Photon>& photons) { (void)photons; }
+
+  /// One camera ray and one light path, which lightRng determines. An unbiased estimate of the sum of the radiance
+  /// along all camera rays of a sample of the image, one per pixel, if the splats are added to it (LightImage). The ray
+  /// must be from the camera with which the integrator was made. Called concurrently from many threads.
+  virtual Rgb radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
+                       std::vector<Splat>& splats) const = 0;
 };
 
 }  // namespace lobe

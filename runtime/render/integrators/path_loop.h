@@ -94,9 +94,8 @@ class PathLoop {
 
   // Traces one segment and processes its end point; returns false when the path ends.
   bool advance(Path& path) const {
-    ++path.statistics->segments;
     const bool dark = path.depth == 1 && options_.emitterVisibility != EmitterVisibility::shown;
-    const std::optional<SurfaceHit> hit = dark ? firstVisible(path) : scene_.tracer.trace(path.ray);
+    const std::optional<SurfaceHit> hit = trace(path);
     if (!hit) {
       if (dark) return false;
       path.radiance +=
@@ -109,15 +108,10 @@ class PathLoop {
     return scatter(path, *hit);
   }
 
-  // The first surface that a camera path meets if the camera does not see emitters as such.
-  std::optional<SurfaceHit> firstVisible(Path& path) const {
-    for (;;) {
-      std::optional<SurfaceHit> hit = scene_.tracer.trace(path.ray);
-      if (!hit || !hit->emitter || options_.emitterVisibility == EmitterVisibility::dark) return hit;
-      path.ray.tfar -= hit->distance;
-      path.ray.origin = offsetPoint(*hit, path.ray.direction);
-      ++path.statistics->segments;
-    }
+  std::optional<SurfaceHit> trace(const Path& path) const {
+    if (path.depth == 1) return scene_.firstVisible(path.ray, options_.emitterVisibility, path.statistics->segments);
+    ++path.statistics->segments;
+    return scene_.tracer.trace(path.ray);
   }
 
   // Russian roulette by throughput; divides the throughput by the survival probability.

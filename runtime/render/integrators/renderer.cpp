@@ -14,25 +14,31 @@ namespace lobe {
 namespace {
 
 constexpr int kTileSize = 16;
+constexpr std::uint64_t kLightSeed = 0x6c69676874;  // keeps the random numbers of light paths apart
 
-class WaveRenderer {
+/// A part of the samples of all pixels.
+struct Wave {
+  PathStatistics statistics;
+  bool complete = true;
+};
+
+/// The pixels of an image in tiles, with the random numbers of their samples.
+class Tiles {
  public:
-  WaveRenderer(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options)
-      : camera_(camera), integrator_(integrator), film_(film), options_(options) {
-    columns_ = (film.width() + kTileSize - 1) / kTileSize;
-    tiles_ = columns_ * ((film.height() + kTileSize - 1) / kTileSize);
+  Tiles(const RayCamera& camera, const RenderOptions& options) : camera_(camera), options_(options) {
+    columns_ = (camera.width() + kTileSize - 1) / kTileSize;
+    count_ = columns_ * ((camera.height() + kTileSize - 1) / kTileSize);
   }
 
-  struct Wave {
-    PathStatistics statistics;
-    bool complete = true;
-  };
+  int count() const { return count_; }
 
-  /// Adds to every pixel the samples that it lacks to have `samples` of them.
-  Wave render(int samples) const {
-    std::vector<std::optional<PathStatistics>> perTile(tiles_);
-    parallelForEach(0, tiles_, [&](int tile) {
-      if (!stopped()) perTile[tile] = renderTile(tile, samples);
+  /// Calls renderPixel(x, y, tile, statistics) for all pixels, in parallel by tiles. Leaves out the tiles that have not
+  /// begun when skip() returns true.
+  template <class Skip, class RenderPixel>
+  Wave render(const Skip& skip, const RenderPixel& renderPixel) const {
+    std::vector<std::optional<PathStatistics>> perTile(count_);
+    parallelForEach(0, count_, [&](int tile) {
+      if (!skip()) renderTile(tile, perTile[tile].emplace(), renderPixel);
     });
     Wave wave;
     for (const auto& statistics : perTile)
@@ -43,24 +49,54 @@ class WaveRenderer {
     return wave;
   }
 
-  bool stopped() const { return options_.stop && *options_.stop != 0; }
+  /// For sample s, counted from RenderOptions::firstSample.
+  Sampler sampler(int x, int y, int s) const {
+    return options_.sampling == PixelSampling::sobol ? Sampler::stratified(options_.seed, pixelOf(x, y), indexOf(s))
+                                                     : Sampler(options_.seed, pixelOf(x, y), indexOf(s));
+  }
+  /// Independent numbers for the light path of the same sample.
+  Sampler lightSampler(int x, int y, int s) const {
+    return Sampler(options_.seed ^ kLightSeed, pixelOf(x, y), indexOf(s));
+  }
+  std::uint32_t indexOf(int s) const {
+    return static_cast<std::uint32_t>(options_.firstSample) + static_cast<std::uint32_t>(s);
+  }
+  std::uint64_t pixelOf(int x, int y) const { return static_cast<std::uint64_t>(y) * camera_.width() + x; }
 
  private:
-  PathStatistics renderTile(int tile, int samples) const {
-    PathStatistics statistics;
+  template <class RenderPixel>
+  void renderTile(int tile, PathStatistics& statistics, const RenderPixel& renderPixel) const {
     const int x0 = tile % columns_ * kTileSize;
     const int y0 = tile / columns_ * kTileSize;
-    for (int y = y0; y < std::min(y0 + kTileSize, film_.height()); ++y)
-      for (int x = x0; x < std::min(x0 + kTileSize, film_.width()); ++x) renderPixel(x, y, samples, statistics);
-    return statistics;
+    for (int y = y0; y < std::min(y0 + kTileSize, camera_.height()); ++y)
+      for (int x = x0; x < std::min(x0 + kTileSize, camera_.width()); ++x) renderPixel(x, y, tile, statistics);
   }
 
+  const RayCamera& camera_;
+  const RenderOptions& options_;
+  int columns_, count_;
+};
+
+bool isSet(const StopFlag* stop) {
+  return stop && *stop != 0;
+}
+
+class WaveRenderer {
+ public:
+  WaveRenderer(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options)
+      : camera_(camera), integrator_(integrator), film_(film), stop_(options.stop), tiles_(camera, options) {}
+
+  /// Adds to every pixel the samples that it lacks to have `samples` of them.
+  Wave render(int samples) {
+    return tiles_.render(
+        [&] { return isSet(stop_); },
+        [&](int x, int y, int, PathStatistics& statistics) { renderPixel(x, y, samples, statistics); });
+  }
+
+ private:
   void renderPixel(int x, int y, int samples, PathStatistics& statistics) const {
-    const auto pixel = static_cast<std::uint64_t>(y) * film_.width() + x;
     for (int s = static_cast<int>(film_.pixel(x, y).samples()); s < samples; ++s) {
-      const std::uint32_t index = static_cast<std::uint32_t>(options_.firstSample) + static_cast<std::uint32_t>(s);
-      Sampler rng = options_.sampling == PixelSampling::sobol ? Sampler::stratified(options_.seed, pixel, index)
-                                                              : Sampler(options_.seed, pixel, index);
+      Sampler rng = tiles_.sampler(x, y, s);
       const Ray ray = camera_.sample(x, y, rng);
       film_.add(x, y, integrator_.radiance(ray, rng, statistics));
     }
@@ -69,8 +105,77 @@ class WaveRenderer {
   const RayCamera& camera_;
   const Integrator& integrator_;
   Film& film_;
-  const RenderOptions& options_;
-  int columns_, tiles_;
+  const StopFlag* stop_;
+  Tiles tiles_;
+};
+
+class BidirectionalRenderer {
+ public:
+  BidirectionalRenderer(const RayCamera& camera, BidirectionalIntegrator& integrator, Film& film,
+                        const RenderOptions& options)
+      : camera_(camera),
+        integrator_(integrator),
+        film_(film),
+        stop_(options.stop),
+        tiles_(camera, options),
+        fromCamera_(film.pixels().size()),
+        fromLights_(camera),
+        splats_(tiles_.count()) {}
+
+  /// Adds samples until every pixel has `samples` of them.
+  Wave render(int samples) {
+    Wave wave;
+    for (int s = static_cast<int>(film_.sampleRange().first); s < samples; ++s) {
+      wave.complete = !isSet(stop_);
+      if (!wave.complete) break;
+      wave.statistics += renderSample(s);
+    }
+    return wave;
+  }
+
+ private:
+  PathStatistics renderSample(int s) {
+    for (std::vector<Splat>& list : splats_) list.clear();
+    PathStatistics statistics = storeLightPaths(s);
+    statistics += inAllTiles([&](int x, int y, int tile, PathStatistics& counts) {
+      Sampler rng = tiles_.sampler(x, y, s), lightRng = tiles_.lightSampler(x, y, s);
+      const Ray ray = camera_.sample(x, y, rng);
+      fromCamera_[tiles_.pixelOf(x, y)] = integrator_.radiance(ray, rng, lightRng, counts, splats_[tile]);
+    });
+    fromLights_.sum(splats_);
+    for (int y = 0; y < camera_.height(); ++y)
+      for (int x = 0; x < camera_.width(); ++x)
+        film_.add(x, y, fromCamera_[tiles_.pixelOf(x, y)] + fromLights_.at(x, y));
+    return statistics;
+  }
+
+  PathStatistics storeLightPaths(int s) {
+    if (!integrator_.storesLightPaths()) return {};
+    integrator_.beginSample(static_cast<int>(tiles_.indexOf(s)));
+    std::vector<std::vector<Photon>> perTile(tiles_.count());
+    const PathStatistics statistics = inAllTiles([&](int x, int y, int tile, PathStatistics& counts) {
+      Sampler lightRng = tiles_.lightSampler(x, y, s);
+      integrator_.storeLightPath(lightRng, counts, perTile[tile]);
+    });
+    std::vector<Photon> all;
+    for (const std::vector<Photon>& photons : perTile) all.insert(all.end(), photons.begin(), photons.end());
+    integrator_.mergeWith(all);
+    return statistics;
+  }
+
+  template <class RenderPixel>
+  PathStatistics inAllTiles(const RenderPixel& renderPixel) const {
+    return tiles_.render([] { return false; }, renderPixel).statistics;
+  }
+
+  const RayCamera& camera_;
+  BidirectionalIntegrator& integrator_;
+  Film& film_;
+  const StopFlag* stop_;
+  Tiles tiles_;
+  std::vector<Rgb> fromCamera_;
+  LightImage fromLights_;
+  std::vector<std::vector<Splat>> splats_;  // by tile
 };
 
 // The number of samples of the next wave; 0 ends rendering. Waves double in size, so that results appear early and the
@@ -112,10 +217,11 @@ void RenderOptions::validate() const {
   if (seconds && !(*seconds > 0.0)) throw std::runtime_error(fmt::format("seconds: {} is not positive", *seconds));
 }
 
-RenderResult render(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options,
-                    const AfterWave& afterWave, const RenderResult& before) {
-  options.validate();
-  const WaveRenderer renderer(camera, integrator, film, options);
+namespace {
+
+template <class Renderer>
+RenderResult renderWaves(Renderer renderer, const Film& film, const RenderOptions& options, const AfterWave& afterWave,
+                         const RenderResult& before) {
   const WavePlan plan(options);
   RenderResult result = before;
   RenderProgress& progress = result.total;
@@ -123,15 +229,29 @@ RenderResult render(const RayCamera& camera, const Integrator& integrator, Film&
   result.stopped = false;
   while (const int samples = plan.next(progress)) {
     const Stopwatch watch;
-    const WaveRenderer::Wave wave = renderer.render(progress.samples + samples);
+    const Wave wave = renderer.render(progress.samples + samples);
     result.statistics += wave.statistics;
     progress.seconds += watch.seconds();
+    progress.samples = static_cast<int>(film.sampleRange().first);
     result.stopped = !wave.complete;
     if (result.stopped) break;
-    progress.samples += samples;
     if (afterWave) afterWave(result);
   }
   return result;
+}
+
+}  // namespace
+
+RenderResult render(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options,
+                    const AfterWave& afterWave, const RenderResult& before) {
+  options.validate();
+  return renderWaves(WaveRenderer(camera, integrator, film, options), film, options, afterWave, before);
+}
+
+RenderResult render(const RayCamera& camera, BidirectionalIntegrator& integrator, Film& film,
+                    const RenderOptions& options, const AfterWave& afterWave, const RenderResult& before) {
+  options.validate();
+  return renderWaves(BidirectionalRenderer(camera, integrator, film, options), film, options, afterWave, before);
 }
 
 }  // namespace lobe

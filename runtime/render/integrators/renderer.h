@@ -50,5 +50,10 @@ using AfterWave = std::function<void(const RenderResult&)>;
 /// of the run that has filled the film.
 RenderResult render(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options,
                     const AfterWave& afterWave = {}, const RenderResult& before = {});
+/// The same with light paths, sample by sample: sample s of pixel i is the radiance along its camera ray plus what the
+/// light paths of sample s of all pixels contribute to it. Rendering is only stopped between samples, so that all
+/// pixels have equally many; a film that is continued must be like that.
+RenderResult render(const RayCamera& camera, BidirectionalIntegrator& integrator, Film& film,
+                    const RenderOptions& options, const AfterWave& afterWave = {}, const RenderResult& before = {});
 
 }  // namespace lobe

@@ -87,6 +87,21 @@ double fluxOf(const DirectionalLight& light, const SceneSphere& sphere) {
   return kPi * radius * radius * luminance(light.irradiance);
 }
 
+float densityOf(const PointLight&, const SceneSphere&, const Vec3&) {
+  return 0.25f * kInvPi;
+}
+float densityOf(const SpotLight& light, const SceneSphere&, const Vec3&) {
+  return static_cast<float>(0.5 * kInvPi / coneHeight(light));
+}
+float densityOf(const ProjectorLight& light, const SceneSphere&, const Vec3& direction) {
+  // Uniform over the image on the plane at distance 1, of which a solid angle covers 1/cos³.
+  const double cosine = light.direction.dot(direction);
+  return static_cast<float>(1.0 / (areaOf(light.image) * cosine * cosine * cosine));
+}
+float densityOf(const DirectionalLight&, const SceneSphere& sphere, const Vec3&) {
+  return kInvPi / (sphere.radius * sphere.radius);
+}
+
 EmittedPhoton photon(const Ray& ray, const Rgb& power, bool far) {
   return {ray, power, far, -1, true};
 }
@@ -130,7 +145,15 @@ std::optional<LightSample> illuminate(const DeltaLight& light, const Vec3& point
 }
 
 std::optional<EmittedPhoton> emit(const DeltaLight& light, const SceneSphere& sphere, const Vec2& u1, const Vec2& u2) {
-  return std::visit([&](const auto& l) { return emitFrom(l, sphere, u1, u2); }, light);
+  std::optional<EmittedPhoton> emitted = std::visit([&](const auto& l) { return emitFrom(l, sphere, u1, u2); }, light);
+  if (!emitted) return std::nullopt;
+  emitted->density = emissionDensity(light, sphere, emitted->ray.direction);
+  emitted->delta = true;
+  return emitted;
+}
+
+float emissionDensity(const DeltaLight& light, const SceneSphere& sphere, const Vec3& direction) {
+  return std::visit([&](const auto& l) { return densityOf(l, sphere, direction); }, light);
 }
 
 }  // namespace lobe

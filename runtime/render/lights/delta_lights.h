@@ -19,4 +19,8 @@ std::optional<LightSample> illuminate(const DeltaLight& light, const Vec3& point
 /// nullopt: a photon of zero power.
 std::optional<EmittedPhoton> emit(const DeltaLight& light, const SceneSphere& sphere, const Vec2& u1, const Vec2& u2);
 
+/// The density with which emit samples a photon in a direction that the light lights: over solid angle, for a
+/// directional light over the area of the disc.
+float emissionDensity(const DeltaLight& light, const SceneSphere& sphere, const Vec3& direction);
+
 }  // namespace lobe

@@ -302,11 +302,10 @@ std::optional<LightSample> Lights::sampleLight(int light, const Vec3& point, dou
   return isArea(light) ? sampleArea(areas_[light], point, choice, u) : illuminate(deltaLight(light), point);
 }
 
-float Lights::pdfOfArea(const AreaLight& light, const Vec3& point, const SurfaceHit& hit) const {
+float Lights::pdfOfArea(const AreaLight& light, const Vec3& point, float distance2, float cosine) {
   if (const auto* sphere = std::get_if<Sphere>(&light.shape->geometry))
     if (const std::optional<Cone> cone = coneOf(*sphere, point)) return sphere->flipped ? 0.0f : coneDensity(*cone);
-  const float distance2 = (hit.position - point).squaredNorm();
-  return toSolidAngle(1.0f / light.area, distance2, hit.normal.dot(hit.woWorld));
+  return toSolidAngle(1.0f / light.area, distance2, cosine);
 }
 
 int LightSelection::chooseCluster(double& choice) const {
@@ -335,7 +334,7 @@ std::optional<LightSample> LightSelection::sample(int cluster, double choice, co
     chosen = *below;
   }
   std::optional<LightSample> result = lights_->sampleLight(chosen.light, at_.position, choice, u);
-  if (result) result->pdf *= clusterProbability(cluster) * chosen.probability;
+  if (result) result->pdf *= clusterProbability(cluster) * chosen.probability, result->light = chosen.light;
   return result;
 }
 
@@ -355,8 +354,18 @@ float LightSelection::probability(int light) const {
 
 float LightSelection::pdf(const SurfaceHit& hit) const {
   const int light = lights_->lightOfShape_[hit.shape];
-  if (light < 0 || hit.normal.dot(hit.woWorld) <= 0.0f || lights_->empty()) return 0.0f;
-  return probability(light) * lights_->pdfOfArea(lights_->areas_[light], at_.position, hit);
+  const float cosine = hit.normal.dot(hit.woWorld);
+  if (light < 0 || cosine <= 0.0f || lights_->empty()) return 0.0f;
+  const float distance2 = (hit.position - at_.position).squaredNorm();
+  return probability(light) * Lights::pdfOfArea(lights_->areas_[light], at_.position, distance2, cosine);
+}
+
+float LightSelection::pdf(const EmittedPhoton& photon, float distance) const {
+  if (photon.light < 0) return environmentPdf(-photon.ray.direction);
+  const float choice = probability(photon.light);
+  const float distance2 = distance * distance;
+  if (photon.delta) return photon.far ? choice : choice * distance2;
+  return choice * Lights::pdfOfArea(lights_->areas_[photon.light], at_.position, distance2, photon.cosine());
 }
 
 float LightSelection::environmentPdf(const Vec3& direction) const {
@@ -374,14 +383,37 @@ std::optional<EmittedPhoton> Lights::areaPhoton(const AreaLight& light, double c
   const PointSample sample = samplePoint(light, choice, u1);
   const Vec3 direction = Frame::fromNormal(sample.point.normal).toWorld(squareToCosineHemisphere(u2));
   const Rgb power = light.shape->emitter->radiance->eval(sample.point.uv) * (kPi / sample.areaDensity);
-  const int number = lightOfShape_[light.shape - scene_.shapes.data()];
-  return EmittedPhoton{
-      spawnRay(sample.point, direction), power, false, number, false, sample.areaDensity, sample.point.normal};
+  EmittedPhoton photon{spawnRay(sample.point, direction), power, false};
+  photon.areaDensity = sample.areaDensity;
+  photon.normal = sample.point.normal;
+  photon.density = sample.areaDensity * photon.cosine() * kInvPi;
+  return photon;
+}
+
+float Lights::photonDensity(const SurfaceHit& hit) const {
+  const int light = lightOfShape_[hit.shape];
+  const float cosine = hit.normal.dot(hit.woWorld);
+  if (light < 0 || cosine <= 0.0f || empty()) return 0.0f;
+  return choice_.probability(light) / areas_[light].area * cosine * kInvPi;
+}
+
+float Lights::environmentPhotonDensity(const Vec3& direction) const {
+  const float choice = environmentProbability();
+  return choice > 0.0f ? choice * environment_->pdf(direction) / discArea() : 0.0f;
+}
+
+float Lights::photonDensity(const LightSample& sample) const {
+  if (sample.light < 0) return environmentPhotonDensity(sample.wi);
+  const float choice = choice_.probability(sample.light);
+  if (sample.delta) return choice * emissionDensity(deltaLight(sample.light), sphere_, -sample.wi);
+  return choice / areas_[sample.light].area * std::abs(sample.source->normal.dot(sample.wi)) * kInvPi;
 }
 
 EmittedPhoton Lights::photonFromEnvironment(const EnvironmentSample& from, const Vec2& u) const {
-  const Rgb power = from.radiance * (kPi * sphere_.radius * sphere_.radius / from.pdf);
-  return {{sphere_.start(from.wi, u), -from.wi}, power, true};
+  const Rgb power = from.radiance * (discArea() / from.pdf);
+  EmittedPhoton photon{{sphere_.start(from.wi, u), -from.wi}, power, true};
+  photon.density = from.pdf / discArea();
+  return photon;
 }
 
 Vec2 Lights::photonCoordinates(const Vec3& point, const Vec3& wi) const {
@@ -400,7 +432,10 @@ std::optional<EmittedPhoton> Lights::samplePhoton(double choice, const Vec2& u1,
   } else if (const std::optional<EnvironmentSample> from = environment_->sample(u1)) {
     photon = photonFromEnvironment(*from, u2);
   }
-  if (photon) photon->power /= choice_.probability(light);
+  if (!photon) return std::nullopt;
+  photon->power /= choice_.probability(light);
+  photon->density *= choice_.probability(light);
+  if (light < areas_.size() + scene_.lights.size()) photon->light = static_cast<int>(light);
   return photon;
 }
 

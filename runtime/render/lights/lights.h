@@ -6,6 +6,7 @@
 // environment. A cluster is chosen with the probabilities of the cell of the receiver, if they have been learnt
 // (light_learning.h), otherwise by power; the tree then chooses within the cluster.
 
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -27,16 +28,23 @@ struct LightSample {
   /// The point on the light (for a point light without normal and offset); nullopt for lights at infinity.
   std::optional<SurfacePoint> source;
   bool delta = false;  ///< a point or directional light: its multiple importance weight is 1
+  int light = -1;      ///< the number of the light, for LightSelection::probability; −1: the environment
 };
 
 struct EmittedPhoton {
   Ray ray;
-  Rgb power;              ///< flux / density of choosing light, point and direction
-  bool far;               ///< emitted at infinity: ray.origin is only a starting point outside the scene
-  int light = -1;         ///< the number of a surface that emits, for LightSelection::probability; −1: another light
-  bool delta = false;     ///< of a light that only next-event estimation finds
-  float areaDensity = 0;  ///< with which the point on the surface was sampled
+  Rgb power;                   ///< flux / density of choosing light, point and direction
+  bool far;                    ///< emitted at infinity: ray.origin is only a starting point outside the scene
+  int light = -1;              ///< the number of the light, for LightSelection::probability; −1: the environment
+  bool delta = false;          ///< of a light that only next-event estimation finds
+  float areaDensity = 0;       ///< with which the point on the surface was sampled
   Vec3 normal = Vec3::Zero();  ///< of the emitting surface; zero without a surface
+  /// The density with which Lights::samplePhoton chooses light, point (area) and direction (solid angle). Point and
+  /// directional lights have no choice of point or direction, respectively.
+  float density = 0;
+
+  /// The cosine between direction and surface; 1 without a surface.
+  float cosine() const { return normal.isZero() ? 1.0f : std::abs(normal.dot(ray.direction)); }
 };
 
 /// Bounding sphere of the scene.
@@ -67,6 +75,9 @@ class LightSelection {
   /// The density with which sample finds the direction towards `hit` on a light; 0 if the hit is not on the front side
   /// of a light.
   float pdf(const SurfaceHit& hit) const;
+  /// The density with which sample finds the origin of a photon that has reached the receiver after `distance`: over
+  /// solid angle; for a point light the probability times distance², for a directional light the probability.
+  float pdf(const EmittedPhoton& photon, float distance) const;
   /// The density with which sample finds a direction by choosing the environment.
   float environmentPdf(const Vec3& direction) const;
   /// The probability with which sample chooses a light other than the environment.
@@ -120,6 +131,14 @@ class Lights {
   /// called if empty(). nullopt: a photon of zero power.
   std::optional<EmittedPhoton> samplePhoton(double choice, const Vec2& u1, const Vec2& u2) const;
 
+  /// EmittedPhoton::density of the photon that travels along the ray of a hit on a light in the opposite direction; 0
+  /// if the hit is not on the front side of a light.
+  float photonDensity(const SurfaceHit& hit) const;
+  /// The same for photons from the environment that travel along −direction.
+  float environmentPhotonDensity(const Vec3& direction) const;
+  /// The same for the photon that travels along −sample.wi from a point that next-event estimation has chosen.
+  float photonDensity(const LightSample& sample) const;
+
   /// A photon from a direction sampled elsewhere (by a learnt density, for example), otherwise as in samplePhoton; its
   /// power is not divided by the probability of choosing the environment.
   EmittedPhoton photonFromEnvironment(const EnvironmentSample& from, const Vec2& u) const;
@@ -150,7 +169,9 @@ class Lights {
 
   /// Sampling of one light, with a density that does not include its choice.
   std::optional<LightSample> sampleLight(int light, const Vec3& point, double choice, const Vec2& u) const;
-  float pdfOfArea(const AreaLight& light, const Vec3& point, const SurfaceHit& hit) const;
+  /// The density of sampleArea over solid angle. distance2: squared, to a point on the light; cosine: there, on the
+  /// front side.
+  static float pdfOfArea(const AreaLight& light, const Vec3& point, float distance2, float cosine);
 
   AreaLight areaLight(const Shape& shape) const;
   std::vector<double> powers() const;
@@ -161,6 +182,7 @@ class Lights {
     return scene_.lights[static_cast<std::size_t>(light) - areas_.size()];
   }
   bool isArea(int light) const { return static_cast<std::size_t>(light) < areas_.size(); }
+  float discArea() const { return kPi * sphere_.radius * sphere_.radius; }
 
   /// Lights that are chosen together: a node of the tree (node ≥ 0), a directional light (light ≥ 0), or a tile of the
   /// environment.

@@ -18,11 +18,41 @@ RenderScene::RenderScene(const Scene& s, int surfaces)
     : scene(s), tracer(s), lights(s, tracer.bounds()), shadowSurfaces(anyTransmits(s) ? surfaces : 0) {}
 
 bool RenderScene::visible(const SurfacePoint& from, const LightSample& light) const {
-  if (!light.source) return !tracer.occluded(spawnRay(from, light.wi));
+  return light.source ? visible(from, *light.source) : !tracer.occluded(spawnRay(from, light.wi));
+}
+
+bool RenderScene::visible(const SurfacePoint& from, const SurfacePoint& to) const {
   // Both end points are moved off their surfaces.
-  const Vec3 origin = offsetPoint(from, light.wi);
-  const Vec3 target = offsetPoint(*light.source, -light.wi);
+  const Vec3 direction = to.position - from.position;
+  const Vec3 origin = offsetPoint(from, direction);
+  const Vec3 target = offsetPoint(to, -direction);
   return !tracer.occluded({origin, target - origin, kBeforeLight});
+}
+
+std::optional<SurfaceHit> RenderScene::firstVisible(Ray ray, EmitterVisibility visibility, std::uint64_t& rays) const {
+  float passed = 0;
+  for (;;) {
+    ++rays;
+    std::optional<SurfaceHit> hit = tracer.trace(ray);
+    if (!hit) return hit;
+    if (!hit->emitter || visibility != EmitterVisibility::hidden) {
+      hit->distance += passed;
+      return hit;
+    }
+    passed += hit->distance;
+    ray.tfar -= hit->distance;
+    ray.origin = offsetPoint(*hit, ray.direction);
+  }
+}
+
+bool RenderScene::visibleToCamera(const SurfaceHit& point, const Ray& ray, EmitterVisibility visibility) const {
+  const Vec3 origin = offsetPoint(point, -ray.direction);
+  if (visibility != EmitterVisibility::hidden) return !tracer.occluded({origin, ray.origin - origin, 1.0f});
+  if (point.emitter) return false;
+  std::uint64_t rays = 0;
+  const Vec3 segment = ray.origin - origin;
+  const float length = segment.norm();
+  return !firstVisible({origin, segment / length, length}, visibility, rays);
 }
 
 TransmittedRay RenderScene::follow(Ray ray, int maxSurfaces, const Vec3* target) const {

@@ -42,6 +42,14 @@ struct RenderScene {
 
   /// Whether a light sample taken at `from.position` is unoccluded; surfaces that transmit light occlude, too.
   bool visible(const SurfacePoint& from, const LightSample& light) const;
+  /// Whether nothing is between two points of surfaces.
+  bool visible(const SurfacePoint& from, const SurfacePoint& to) const;
+
+  /// The first surface that the camera sees along one of its rays. `rays` is increased by the number of rays traced;
+  /// the distance of the hit is from the origin of `ray`, also behind emitters that are hidden.
+  std::optional<SurfaceHit> firstVisible(Ray ray, EmitterVisibility visibility, std::uint64_t& rays) const;
+  /// Whether the camera sees the point of a surface at the end of its ray.
+  bool visibleToCamera(const SurfaceHit& point, const Ray& ray, EmitterVisibility visibility) const;
 
   const Scene& scene;
   RayTracer tracer;

@@ -16,9 +16,6 @@ struct ParticleState {
   Rgb weight;
 };
 
-/// The quantity that a particle carries: radiance against its direction (importons), or flux along it (photons).
-enum class Transport { radiance, flux };
-
 struct Scattered {
   Vec3 wi;         ///< unit, local
   Vec3 direction;  ///< the same in world space

@@ -106,6 +106,7 @@ class Training {
   }
 
   const Field& radiance() const { return radiance_; }
+  const Field& importance() const { return importance_; }
   SampleStorage takeParticles() { return std::move(samples_); }
 
  private:
@@ -167,7 +168,8 @@ TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera&
   report.seconds = watch.seconds();
   report.undersampledFraction = training.radiance().undersampledFraction();
   report.learntFractions = plan.learnFractions && caches != nullptr;
-  TrainedIllumination trained{training.radiance().frozen(), report, {}};
+  TrainedIllumination trained{training.radiance().frozen(), report, {}, {}};
+  if (plan.keepImportance) trained.importance = training.importance().frozen();
   if (plan.keepParticles) trained.particles = training.takeParticles();
   return trained;
 }

@@ -27,8 +27,9 @@ struct TrainingPlan {
   std::uint64_t seed = 1;
   /// Records learn BSDF sampling fractions; otherwise, and without caches, that of kProductProbabilities is used.
   bool learnFractions = true;
-  bool keepParticles = false;  ///< keep those of the last pass in TrainedIllumination::particles
-  FieldOptions records;        ///< except for the scene's diagonal, which training sets
+  bool keepParticles = false;   ///< keep those of the last pass in TrainedIllumination::particles
+  bool keepImportance = false;  ///< keep what guided the photons in TrainedIllumination::importance
+  FieldOptions records;         ///< except for the scene's diagonal, which training sets
 
   /// Throws std::runtime_error that names the field.
   void validate() const;
@@ -55,6 +56,7 @@ struct TrainedIllumination {
   Field field;
   TrainingReport report;
   SampleStorage particles;  ///< of the last pass, if kept
+  Field importance;         ///< learnt from importons, if kept; without records if training traces no photons
 };
 
 /// caches: for the product; nullptr: training paths are guided by illumination only. afterPass: called after each pass

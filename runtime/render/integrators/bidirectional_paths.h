@@ -1,0 +1,376 @@
+#pragma once
+// Bidirectional path tracing (Veach 1997, Chapter 10): for each camera ray a light path is traced, too; every vertex of
+// the camera path is connected to every vertex of the light path and to a point sampled on a light, every vertex of the
+// light path to the camera, and all techniques are combined by multiple importance sampling (partial_weights.h). Light
+// paths do not hit the lens.
+//
+// Vertices of camera paths may also be merged with the vertices of all light paths of the same sample of the image, the
+// photons, within a radius (vertex connection and merging, Georgiev et al. 2012, "Light Transport Simulation with
+// Vertex Connection and Merging"). The estimate then has a bias, which vanishes with the radius.
+//
+// Directions of both subpaths are sampled by guides, which path_loop.h defines. The densities in the weights are those
+// of the guides in both directions.
+//
+// Connections do not pass through surfaces that transmit light: what is behind glass is found by tracing rays. A point
+// or directional light behind glass is therefore not seen in a mirror.
+
+#include <deque>
+
+#include "runtime/render/film/light_image.h"
+#include "runtime/render/integrators/partial_weights.h"
+#include "runtime/render/integrators/path_loop.h"
+#include "runtime/render/integrators/photon_grid.h"
+
+namespace lobe {
+
+template <class CameraGuide, class LightGuide>
+class BidirectionalPaths {
+ public:
+  /// All references must outlive it.
+  BidirectionalPaths(const RenderScene& scene, const RayCamera& camera, const PathOptions& options,
+                     const CameraGuide& cameraGuide, const LightGuide& lightGuide)
+      : scene_(scene), camera_(camera), options_(options), cameraGuide_(cameraGuide), lightGuide_(lightGuide) {}
+
+  /// Lets radiance merge vertices with photons, which must outlive it.
+  void mergeWith(const PhotonGrid& photons) { photons_ = &photons, merging_ = photons.area() * lightPaths(); }
+  /// Appends the vertices of the light path that radiance traces with the same random numbers, to be merged with within
+  /// a radius.
+  void storePhotons(Sampler& lightRng, PathStatistics& statistics, float radius, std::vector<Photon>& photons) {
+    merging_ = PhotonGrid::areaOf(radius) * lightPaths();
+    std::vector<Splat> none;
+    Sample sample{lightRng, lightRng, statistics, none};
+    sample.photons = &photons;
+    traceLightPath(sample);
+  }
+
+  /// See BidirectionalIntegrator.
+  Rgb radiance(const Ray& cameraRay, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
+               std::vector<Splat>& splats) const {
+    Sample sample{rng, lightRng, statistics, splats};
+    ++statistics.paths;
+    traceLightPath(sample);
+    traceCameraPath(sample, cameraRay);
+    return sample.radiance;
+  }
+
+ private:
+  /// A vertex with a non-delta component. throughput: without the BSDF at this vertex; on light paths the flux.
+  template <class Guide>
+  struct Vertex {
+    Vertex(const Guide& guide, const SurfaceHit& h, const Rgb& weight, const PartialWeights& partial, int segments,
+           float fraction)
+        : hit(h), throughput(weight), weights(partial), depth(segments), smooth(fraction), sampler(guide, hit) {}
+    Vertex(const Vertex&) = delete;
+    Vertex& operator=(const Vertex&) = delete;
+
+    /// The density with which the subpath continues in a direction (world space).
+    float pdf(const Vec3& direction) const { return smooth * sampler.pdf(hit.frame.toLocal(direction)); }
+
+    SurfaceHit hit;
+    Rgb throughput;
+    PartialWeights weights;
+    int depth;     // segments from the origin of the subpath
+    float smooth;  // probability of sampling the non-delta component
+    typename Guide::Vertex sampler;
+  };
+  using CameraVertex = Vertex<CameraGuide>;
+  using LightVertex = Vertex<LightGuide>;
+
+  /// A subpath that is being traced.
+  struct Walk {
+    Ray ray;
+    Rgb throughput;
+    PartialWeights weights;
+    LightSelection nextEvent = {};  // at the last vertex of a camera path
+    int depth = 0;
+    float eta2 = 1;              // as in PathLoop; 1 on light paths
+    Rgb expected = Rgb::Ones();  // as in PathLoop
+    float start = 1;             // largest component of the first throughput
+  };
+
+  struct Sample {
+    Sampler& rng;
+    Sampler& lightRng;  // of the light path, so that the stratified numbers are left to the camera path
+    PathStatistics& statistics;
+    std::vector<Splat>& splats;
+    Rgb radiance = Rgb::Zero();
+    Vec2 lens = Vec2::Zero();  // point of the lens to which the light path is connected
+    std::deque<LightVertex> lightPath = {};
+    std::vector<Photon>* photons = nullptr;  // if set, the light path is only stored there
+  };
+
+  double lightPaths() const { return static_cast<double>(camera_.width()) * camera_.height(); }
+
+  // ---- Light path
+
+  void traceLightPath(Sample& sample) const {
+    if (scene_.lights.empty() || options_.maxDepth < 2) return;
+    if (camera_.hasLens()) sample.lens = squareToDisk(sample.lightRng.uniform2());
+    const double choice = sample.lightRng.uniformDouble();
+    const Vec2 u1 = sample.lightRng.uniform2();
+    const Vec2 u2 = sample.lightRng.uniform2();
+    const std::optional<EmittedPhoton> photon = scene_.lights.samplePhoton(choice, u1, u2);
+    if (!photon || !(photon->density > 0.0f) || !(photon->power.maxCoeff() > 0.0f)) return;
+    std::optional<SurfaceHit> hit = trace(sample, photon->ray);
+    if (!hit) return;
+    // Next-event estimation at the first vertex has the same receiver as on a camera path, which arrives on the same
+    // side of a surface that only reflects.
+    const float nextEvent = scene_.lights.at(*hit).pdf(*photon, hit->distance);
+    Walk walk{photon->ray, photon->power,
+              PartialWeights::fromLight(nextEvent, photon->density, photon->cosine(), photon->delta, merging_)};
+    walk.start = photon->power.maxCoeff();
+    // The last segment of a path of maximum length is a connection.
+    while (hit && ++walk.depth < options_.maxDepth && advanceLightPath(sample, walk, *hit))
+      hit = trace(sample, walk.ray);
+  }
+
+  bool advanceLightPath(Sample& sample, Walk& walk, const SurfaceHit& hit) const {
+    if (!arrive(walk, hit) || !survives(sample.lightRng, walk)) return false;
+    const float delta = hit.bsdf->deltaProbability(hit.wo, hit.uv);
+    const bool ends = walk.depth + 1 >= options_.maxDepth;
+    if (delta >= 1.0f) return !ends && scatterDelta<Transport::flux>(sample, walk, hit, delta);
+    const LightVertex& vertex =
+        sample.lightPath.emplace_back(lightGuide_, hit, walk.throughput, walk.weights, walk.depth, 1.0f - delta);
+    if (sample.photons)
+      sample.photons->push_back({hit.position, hit.normal, hit.woWorld, walk.throughput, walk.weights, walk.depth});
+    else
+      connectToCamera(sample, vertex);
+    return !ends && scatter<Transport::flux>(sample, walk, vertex, delta);
+  }
+
+  void connectToCamera(Sample& sample, const LightVertex& vertex) const {
+    const std::optional<CameraView> view = camera_.view(vertex.hit.position, sample.lens);
+    if (!view) return;
+    const Vec3 direction = -view->ray.direction;
+    const SurfaceHit seen = asSeenFrom(scene_.scene, vertex.hit, direction);
+    const Rgb scattered = evalAdjointBsdf(vertex.hit, seen);
+    if (!(scattered.maxCoeff() > 0.0f)) return;
+    ++sample.statistics.shadowRays;
+    if (!scene_.visibleToCamera(vertex.hit, view->ray, options_.emitterVisibility)) return;
+    const float density = view->density * std::abs(vertex.hit.normal.dot(direction));  // over area of the surface
+    const double others =
+        squared(density / lightPaths()) * vertex.weights.with(pdfFrom(cameraGuide_, seen, vertex.hit));
+    const double weight = 1.0 / (1.0 + others);
+    sample.splats.push_back(
+        {view->film, vertex.throughput * scattered * static_cast<float>(density * weight / lightPaths())});
+  }
+
+  // ---- Camera path
+
+  void traceCameraPath(Sample& sample, const Ray& ray) const {
+    const bool dark = options_.emitterVisibility != EmitterVisibility::shown;
+    std::optional<SurfaceHit> hit = scene_.firstVisible(ray, options_.emitterVisibility, sample.statistics.segments);
+    if (!hit) {
+      if (!dark) sample.radiance += scene_.lights.environmentRadiance(ray.direction);
+      return;
+    }
+    if (!dark) sample.radiance += emittedRadiance(*hit);
+    Walk walk{ray, Rgb::Ones(),
+              PartialWeights::fromCamera(camera_.density(ray, hit->distance), lightPaths(), merging_)};
+    while (hit && ++walk.depth < options_.maxDepth && advanceCameraPath(sample, walk, *hit)) {
+      hit = trace(sample, walk.ray);
+      addEmission(sample, walk, hit);
+    }
+  }
+
+  bool advanceCameraPath(Sample& sample, Walk& walk, const SurfaceHit& hit) const {
+    if (!arrive(walk, hit) || !survives(sample.rng, walk)) return false;
+    walk.nextEvent = scene_.lights.at(hit);
+    const float delta = hit.bsdf->deltaProbability(hit.wo, hit.uv);
+    if (delta >= 1.0f) return scatterDelta<Transport::radiance>(sample, walk, hit, delta);
+    const CameraVertex vertex(cameraGuide_, hit, walk.throughput, walk.weights, walk.depth, 1.0f - delta);
+    addDirectLight(sample, vertex, walk.nextEvent);
+    for (const LightVertex& light : sample.lightPath) {
+      if (walk.depth + light.depth >= options_.maxDepth) break;
+      connect(sample, vertex, light);
+    }
+    if (photons_) photons_->forEachNear(hit.position, [&](const Photon& photon) { merge(sample, vertex, photon); });
+    return scatter<Transport::radiance>(sample, walk, vertex, delta);
+  }
+
+  /// Emission that the last segment of a camera path has found, on a surface or in the environment.
+  void addEmission(Sample& sample, const Walk& walk, const std::optional<SurfaceHit>& hit) const {
+    const Lights& lights = scene_.lights;
+    if (hit && !hit->emitter) return;
+    const Vec3& direction = walk.ray.direction;
+    const Rgb emitted = hit ? emittedRadiance(*hit) : lights.environmentRadiance(direction);
+    if (!(emitted.maxCoeff() > 0.0f)) return;
+    const double others =
+        hit ? walk.weights.atLight(walk.nextEvent.pdf(*hit), lights.photonDensity(*hit), hit->normal.dot(hit->woWorld))
+            : walk.weights.atLight(walk.nextEvent.environmentPdf(direction), lights.environmentPhotonDensity(direction),
+                                   1.0f);
+    sample.radiance += walk.throughput * emitted * static_cast<float>(1.0 / (1.0 + others));
+  }
+
+  /// Next-event estimation: connects to a point that is sampled on a light.
+  void addDirectLight(Sample& sample, const CameraVertex& vertex, const LightSelection& lights) const {
+    const SurfaceHit& hit = vertex.hit;
+    const double choice = sample.rng.stratifiedDouble();
+    const std::optional<LightSample> light = lights.sample(choice, sample.rng.stratified2());
+    if (!light) return;
+    const Vec3 wi = hit.frame.toLocal(light->wi);
+    if (!sidesAgree(hit, light->wi, wi)) return;
+    const Rgb f = evalBsdf(hit, wi);
+    if (!(f.maxCoeff() > 0.0f)) return;
+    ++sample.statistics.shadowRays;
+    if (!scene_.visible(hit, *light)) return;
+    const double weight = 1.0 / (1.0 + othersOfDirectLight(vertex, *light));
+    sample.radiance +=
+        vertex.throughput * f * light->radiance * static_cast<float>(std::abs(wi.z()) * weight / light->pdf);
+  }
+
+  /// The sum over all other techniques of their squared densities, relative to next-event estimation.
+  double othersOfDirectLight(const CameraVertex& vertex, const LightSample& light) const {
+    const SurfaceHit& hit = vertex.hit;
+    const bool onSurface = light.source && !light.delta;
+    const double cosineAtLight = onSurface ? std::abs(light.source->normal.dot(light.wi)) : 1.0f;
+    // A point light has a density over solid angle in the sense of LightSelection::pdf.
+    const double density =
+        light.delta && light.source ? static_cast<double>(light.pdf) * squared(light.distance) : light.pdf;
+    const double emission = scene_.lights.photonDensity(light) * std::abs(hit.normal.dot(light.wi)) / cosineAtLight;
+    const SurfaceHit seen = asSeenFrom(scene_.scene, hit, light.wi);
+    const double hits = light.delta ? 0.0 : squared(vertex.pdf(light.wi) / density);
+    return hits + squared(emission / density) * vertex.weights.with(pdfFrom(lightGuide_, seen, hit));
+  }
+
+  void connect(Sample& sample, const CameraVertex& vertex, const LightVertex& light) const {
+    const Vec3 between = light.hit.position - vertex.hit.position;
+    const float distance2 = between.squaredNorm();
+    if (!(distance2 > 0.0f)) return;
+    const Vec3 direction = between / std::sqrt(distance2);
+    const Vec3 wi = vertex.hit.frame.toLocal(direction);
+    if (!sidesAgree(vertex.hit, direction, wi)) return;
+    const Rgb f = evalBsdf(vertex.hit, wi);
+    if (!(f.maxCoeff() > 0.0f)) return;
+    const SurfaceHit seen = asSeenFrom(scene_.scene, light.hit, -direction);
+    const Rgb scattered = evalAdjointBsdf(light.hit, seen);
+    if (!(scattered.maxCoeff() > 0.0f)) return;
+    ++sample.statistics.shadowRays;
+    if (!scene_.visible(vertex.hit, light.hit)) return;
+    // Densities over the area of the vertex at the other end.
+    const float toLight = std::abs(light.hit.normal.dot(direction)) / distance2;
+    const float toCamera = std::abs(vertex.hit.normal.dot(direction)) / distance2;
+    const SurfaceHit fromLight = asSeenFrom(scene_.scene, vertex.hit, direction);
+    const double others =
+        squared(vertex.pdf(direction) * toLight) * light.weights.with(pdfFrom(cameraGuide_, seen, light.hit)) +
+        squared(light.pdf(-direction) * toCamera) * vertex.weights.with(pdfFrom(lightGuide_, fromLight, vertex.hit));
+    sample.radiance += vertex.throughput * light.throughput * f * scattered *
+                       static_cast<float>(std::abs(wi.z()) * toLight / (1.0 + others));
+  }
+
+  void merge(Sample& sample, const CameraVertex& vertex, const Photon& photon) const {
+    const SurfaceHit& hit = vertex.hit;
+    if (vertex.depth + photon.depth > options_.maxDepth) return;
+    const Vec3 wi = hit.frame.toLocal(photon.direction);
+    if (!sidesAgree(hit, photon.direction, wi)) return;
+    const Rgb f = evalBsdf(hit, wi);
+    if (!(f.maxCoeff() > 0.0f)) return;
+    const SurfaceHit seen = asSeenFrom(scene_.scene, hit, photon.direction);
+    const double weight =
+        vertex.weights.ofMerging(pdfFrom(lightGuide_, seen, hit), photon.weights, vertex.pdf(photon.direction));
+    // The density of photons over area contains the cosine to the geometric normal where they arrived.
+    const float cosine = std::abs(photon.normal.dot(photon.direction));
+    sample.radiance +=
+        vertex.throughput * f * photon.flux * static_cast<float>(std::abs(wi.z()) / cosine * weight / merging_);
+  }
+
+  // ---- Both
+
+  std::optional<SurfaceHit> trace(Sample& sample, const Ray& ray) const {
+    ++sample.statistics.segments;
+    return scene_.tracer.trace(ray);
+  }
+
+  /// Updates the weights at a hit; returns false if nothing is scattered there.
+  static bool arrive(Walk& walk, const SurfaceHit& hit) {
+    const float cosine = std::abs(hit.normal.dot(hit.woWorld));
+    if (!hit.bsdf || !(cosine > 0.0f) || !sidesAgree(hit, hit.woWorld, hit.wo)) return false;
+    walk.weights.arrive(walk.depth == 1 ? 1.0f : hit.distance, cosine);
+    return true;
+  }
+
+  /// Russian roulette by throughput, as in PathLoop.
+  bool survives(Sampler& rng, Walk& walk) const {
+    if (walk.depth < options_.rouletteDepth) return true;
+    const float carried = std::max(walk.throughput.maxCoeff() * walk.eta2 / walk.start, walk.expected.maxCoeff());
+    const float survival = std::min(carried, kMaxSurvival);
+    if (!(rng.uniform() < survival)) return false;
+    walk.throughput /= survival;
+    return true;
+  }
+
+  /// The density with which paths of a guide that arrive along seen.wo continue along hit.wo; both are the same point.
+  template <class Guide>
+  static float pdfFrom(const Guide& guide, const SurfaceHit& seen, const SurfaceHit& hit) {
+    if (!sidesAgree(seen, seen.woWorld, seen.wo)) return 0.0f;
+    const float smooth = 1.0f - seen.bsdf->deltaProbability(seen.wo, seen.uv);
+    if (smooth <= 0.0f) return 0.0f;
+    return smooth * typename Guide::Vertex(guide, seen).pdf(seen.frame.toLocal(hit.woWorld));
+  }
+
+  /// Scatters a subpath; returns false if it ends.
+  template <Transport transport, class Guide>
+  bool scatter(Sample& sample, Walk& walk, const Vertex<Guide>& vertex, float delta) const {
+    const SurfaceHit& hit = vertex.hit;
+    Sampler& rng = rngOf<transport>(sample);
+    if (delta > 0.0f && rng.uniform() < delta) return scatterDelta<transport>(sample, walk, hit, delta);
+    const std::optional<BsdfSample> scattered = vertex.sampler.sample(rng, sample.statistics);
+    if (!scattered) return false;
+    const float pdf = vertex.smooth * scattered->pdf;
+    const Vec3 direction = hit.frame.toWorld(scattered->wi).normalized();
+    if (!sidesAgree(hit, direction, scattered->wi)) return false;
+    const SurfaceHit seen = asSeenFrom(scene_.scene, hit, direction);
+    const float cosine = std::abs(hit.normal.dot(direction));
+    if constexpr (transport == Transport::flux) {
+      walk.weights.scatter(pdf, pdfFrom(cameraGuide_, seen, hit), cosine);
+      return continueAlong(walk, hit, direction, evalAdjointBsdf(hit, seen) * (cosine / pdf));
+    } else {
+      walk.weights.scatter(pdf, pdfFrom(lightGuide_, seen, hit), cosine);
+      walk.eta2 *= squaredEta(scattered->eta);
+      return continueAlong(walk, hit, direction, scattered->f * (std::abs(scattered->wi.z()) / pdf));
+    }
+  }
+
+  template <Transport transport>
+  bool scatterDelta(Sample& sample, Walk& walk, const SurfaceHit& hit, float fraction) const {
+    sample.statistics.countDelta();
+    constexpr bool flux = transport == Transport::flux;
+    const float choice = rngOf<transport>(sample).uniform();
+    const std::optional<DeltaSample> scattered = flux ? sampleAdjointDelta(hit, choice) : sampleDelta(hit, choice);
+    if (!scattered) return false;
+    const Vec3 direction = hit.frame.toWorld(scattered->wi).normalized();
+    if (!sidesAgree(hit, direction, scattered->wi)) return false;
+    if (!sameFrame(hit, asSeenFrom(scene_.scene, hit, direction))) {
+      // The delta component takes another way in the other direction.
+      if (flux) return false;
+      walk.weights.exclude();
+    }
+    walk.weights.scatterDelta(std::abs(hit.normal.dot(hit.woWorld)), scattered->eta);
+    if (!flux) walk.eta2 *= squaredEta(scattered->eta);
+    return continueAlong(walk, hit, direction, scattered->weight / fraction);
+  }
+
+  static bool continueAlong(Walk& walk, const SurfaceHit& hit, const Vec3& direction, const Rgb& weight) {
+    walk.throughput *= weight;
+    walk.expected *= hit.bsdf->albedo(hit.wo, hit.uv);
+    walk.ray = spawnRay(hit, direction);
+    return walk.throughput.maxCoeff() > 0.0f;
+  }
+
+  template <Transport transport>
+  static Sampler& rngOf(Sample& sample) {
+    return transport == Transport::flux ? sample.lightRng : sample.rng;
+  }
+  static float squaredEta(float eta) { return eta * eta; }
+  static bool sameFrame(const SurfaceHit& a, const SurfaceHit& b) { return a.frame.n.dot(b.frame.n) > 1.0f - 1e-5f; }
+
+  const RenderScene& scene_;
+  const RayCamera& camera_;
+  const PathOptions& options_;
+  const CameraGuide& cameraGuide_;
+  const LightGuide& lightGuide_;
+  const PhotonGrid* photons_ = nullptr;
+  double merging_ = 0;  // PartialWeights::fromLight
+};
+
+}  // namespace lobe
