@@ -53,6 +53,7 @@ CheckpointFile::CheckpointFile(FileContent file, const std::filesystem::path& pa
   info_ = readInfo(root);
   pixels_ = inPlace<StoredPixel>(*root.pixels());
   illumination_ = std::as_bytes(std::span(root.illumination()->data(), root.illumination()->size()));
+  importance_ = std::as_bytes(std::span(root.importance()->data(), root.importance()->size()));
   if (pixels_.empty() || std::uint64_t{info_.width} * info_.height != pixels_.size())
     refuseDamaged(name, fmt::format("{} pixels for a film of {}x{}", pixels_.size(), info_.width, info_.height));
   for (std::size_t i = 0; i < pixels_.size(); ++i) checkPixel(pixels_[i], i, name);
@@ -67,10 +68,12 @@ CheckpointFile CheckpointFile::open(const std::filesystem::path& path) {
 }
 
 std::vector<std::byte> encodeCheckpoint(const CheckpointInfo& info, std::span<const StoredPixel> pixels,
-                                        std::span<const std::byte> illumination) {
+                                        std::span<const std::byte> illumination,
+                                        std::span<const std::byte> importance) {
   constexpr std::size_t kOthers = 1 << 20;  // more than the other fields take
-  const std::size_t size = pixels.size_bytes() + illumination.size() + kOthers;
-  if (size > FLATBUFFERS_MAX_BUFFER_SIZE) throw std::runtime_error("the film and the illumination are too large");
+  const std::size_t size = pixels.size_bytes() + illumination.size() + importance.size() + kOthers;
+  if (size > FLATBUFFERS_MAX_BUFFER_SIZE)
+    throw std::runtime_error("the film, the illumination and the importance are too large");
   flatbuffers::FlatBufferBuilder builder(size);
   std::vector<flatbuffers::Offset<fb::Setting>> settings;
   for (const auto& [name, value] : info.settings) {
@@ -83,11 +86,13 @@ std::vector<std::byte> encodeCheckpoint(const CheckpointInfo& info, std::span<co
       builder.CreateVectorOfStructs(reinterpret_cast<const fb::Pixel*>(pixels.data()), pixels.size());
   const auto illuminationVector =
       builder.CreateVector(reinterpret_cast<const std::uint8_t*>(illumination.data()), illumination.size());
+  const auto importanceVector =
+      builder.CreateVector(reinterpret_cast<const std::uint8_t*>(importance.data()), importance.size());
   const auto passVector =
       builder.CreateVectorOfStructs(reinterpret_cast<const fb::TrainingPass*>(info.passes.data()), info.passes.size());
   const auto counterVector = builder.CreateVector(info.counters);
   builder.Finish(fb::CreateCheckpoint(builder, settingVector, info.width, info.height, pixelVector, illuminationVector,
-                                      info.trainingSeconds, info.renderingSeconds, passVector,
+                                      importanceVector, info.trainingSeconds, info.renderingSeconds, passVector,
                                       info.undersampledFraction, info.learntFractions, counterVector));
   return wrapPayload(kCheckpointFormat, std::as_bytes(std::span(builder.GetBufferPointer(), builder.GetSize())));
 }

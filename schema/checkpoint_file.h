@@ -13,7 +13,7 @@
 
 namespace lobe {
 
-inline constexpr FileFormat kCheckpointFormat{{'C', 'K', 'P', 'T'}, 1, 0};
+inline constexpr FileFormat kCheckpointFormat{{'C', 'K', 'P', 'T'}, 2, 0};
 
 // Read in place: the layout of these structs equals that of the schema (size checked at compile time, order of the
 // fields by a test).
@@ -27,7 +27,7 @@ struct StoredPass {
   double logLikelihood;  ///< NaN if not known
 };
 
-/// Everything but the film and the illumination.
+/// Everything but the film, the illumination and the importance.
 struct CheckpointInfo {
   std::vector<std::pair<std::string, std::string>> settings;  ///< names and values
   std::uint32_t width = 0, height = 0;
@@ -45,25 +45,27 @@ inline constexpr std::uint64_t kMaxCheckpointPixels = std::uint64_t{1} << 25;
 class CheckpointFile {
  public:
   /// Reads the file and checks its structure and content: one pixel for each place of the film, sums that are finite
-  /// and not negative, sample counts that fit an int. The illumination is not checked. Throws std::runtime_error that
-  /// names the file and the fault.
+  /// and not negative, sample counts that fit an int. Illumination and importance are not checked. Throws
+  /// std::runtime_error that names the file and the fault.
   static CheckpointFile open(const std::filesystem::path& path);
 
   const CheckpointInfo& info() const { return info_; }
   std::span<const StoredPixel> pixels() const { return pixels_; }
   /// The content of an .illum file; empty if the integrator uses none.
   std::span<const std::byte> illumination() const { return illumination_; }
+  /// The same for the importance that guides light paths.
+  std::span<const std::byte> importance() const { return importance_; }
 
  private:
   CheckpointFile(FileContent file, const std::filesystem::path& path);
   FileContent file_;
   CheckpointInfo info_;
   std::span<const StoredPixel> pixels_;
-  std::span<const std::byte> illumination_;
+  std::span<const std::byte> illumination_, importance_;
 };
 
 /// The bytes of a file. Throws std::runtime_error if they are too many for the format.
 std::vector<std::byte> encodeCheckpoint(const CheckpointInfo& info, std::span<const StoredPixel> pixels,
-                                        std::span<const std::byte> illumination);
+                                        std::span<const std::byte> illumination, std::span<const std::byte> importance);
 
 }  // namespace lobe

@@ -45,7 +45,8 @@ void checkSameRun(const CheckpointFile& file, const std::filesystem::path& path,
 }
 
 std::vector<std::byte> encodeCheckpoint(const RunSettings& settings, const Film& film, const RenderResult& result,
-                                        const TrainingReport& training, std::span<const std::byte> illumination) {
+                                        const TrainingReport& training, std::span<const std::byte> illumination,
+                                        std::span<const std::byte> importance) {
   CheckpointInfo info;
   info.settings = settings;
   info.width = static_cast<std::uint32_t>(film.width());
@@ -60,7 +61,7 @@ std::vector<std::byte> encodeCheckpoint(const RunSettings& settings, const Film&
   for (const std::uint64_t* count : countersOf(result.statistics)) info.counters.push_back(*count);
   std::vector<StoredPixel> pixels(film.pixels().size());
   std::ranges::transform(film.pixels(), pixels.begin(), stored);
-  return encodeCheckpoint(info, pixels, illumination);
+  return encodeCheckpoint(info, pixels, illumination, importance);
 }
 
 Film filmOf(const CheckpointFile& file) {

@@ -21,9 +21,10 @@ using RunSettings = std::vector<std::pair<std::string, std::string>>;
 /// Throws std::runtime_error that names the first setting that differs.
 void checkSameRun(const CheckpointFile& file, const std::filesystem::path& path, const RunSettings& settings);
 
-/// The bytes of a checkpoint. illumination: the content of an .illum file; empty if the integrator uses none.
+/// The bytes of a checkpoint. illumination, importance: the content of .illum files; empty if the integrator uses none.
 std::vector<std::byte> encodeCheckpoint(const RunSettings& settings, const Film& film, const RenderResult& result,
-                                        const TrainingReport& training, std::span<const std::byte> illumination);
+                                        const TrainingReport& training, std::span<const std::byte> illumination,
+                                        std::span<const std::byte> importance);
 
 Film filmOf(const CheckpointFile& file);
 /// Throws std::runtime_error if the file does not have the counters of this version.

@@ -28,10 +28,11 @@ constexpr std::uint64_t kMaxSeed = std::uint64_t{1} << 53;  // the metadata of a
 template <class Enumeration>
 using Names = std::vector<std::pair<std::string, Enumeration>>;
 
-const Names<IntegratorKind> kIntegratorNames{{"auto", IntegratorKind::automatic},
-                                             {"path", IntegratorKind::path},
-                                             {"guided", IntegratorKind::guided},
-                                             {"product", IntegratorKind::product}};
+const Names<IntegratorKind> kIntegratorNames{{"auto", IntegratorKind::automatic}, {"path", IntegratorKind::path},
+                                             {"bdpt", IntegratorKind::bdpt},      {"vcm", IntegratorKind::vcm},
+                                             {"guided", IntegratorKind::guided},  {"product", IntegratorKind::product}};
+const Names<BdptGuide> kGuideNames{
+    {"none", BdptGuide::none}, {"illumination", BdptGuide::illumination}, {"product", BdptGuide::product}};
 const Names<RussianRoulette> kRussianRouletteNames{{"throughput", RussianRoulette::throughput},
                                                    {"efficiency", RussianRoulette::efficiency}};
 const Names<PixelSampling> kSamplerNames{{"sobol", PixelSampling::sobol}, {"independent", PixelSampling::independent}};
@@ -48,8 +49,9 @@ struct Options {
   std::string size, record;
   int threads = 0;
   bool check = false, json = false;
-  std::vector<const CLI::Option*> guidedOnly;  ///< rendering options that path tracing ignores
-  std::vector<const CLI::Option*> training;    ///< options that some integrators ignore
+  // Options that some integrators ignore.
+  const CLI::Option *guide = nullptr, *reduction = nullptr, *roulette = nullptr;
+  std::vector<const CLI::Option*> training, merging;
 };
 
 /// Declares the training options, all of which exclude --illumination.
@@ -93,6 +95,25 @@ void declareTraining(CLI::App& app, Options& options) {
   app.option_defaults()->group("Options");
 }
 
+/// Declares the options of bdpt and vcm.
+void declareBidirectional(CLI::App& app, Options& options) {
+  RenderJob& job = options.job;
+  options.guide =
+      app.add_option("--guide", job.guide,
+                     "Guiding of bdpt: none, illumination (camera paths by illumination, light paths by importance) or "
+                     "product (camera paths by BRDF times illumination)")
+          ->transform(oneOf(kGuideNames))
+          ->default_str("none");
+  options.merging = {
+      app.add_option("--merge-radius", job.merge.first,
+                     "Radius of vertex merging of vcm in the first sample, as a fraction of the scene's diagonal; the "
+                     "bias of the picture vanishes with it")
+          ->capture_default_str(),
+      app.add_option("--merge-alpha", job.merge.alpha,
+                     "Reduction of this radius: sample i has the radius times i to the power (alpha - 1)/2")
+          ->capture_default_str()};
+}
+
 void declare(CLI::App& app, Options& options) {
   RenderJob& job = options.job;
   app.add_option("scene", job.scene, "Mitsuba scene file")->required()->type_name("SCENE.xml");
@@ -104,10 +125,13 @@ void declare(CLI::App& app, Options& options) {
       ->type_name("DIR")
       ->capture_default_str();
   app.add_option("--integrator", job.integrator,
-                 "Integrator: path (BSDF sampling), guided (illumination and BSDF), product (BRDF times illumination), "
-                 "or auto: path or product, whichever has the lower error in a short comparison after training")
+                 "Integrator: path (BSDF sampling), bdpt (bidirectional path tracing), vcm (vertex connection and "
+                 "merging, which is biased but consistent), guided (illumination and BSDF), product (BRDF times "
+                 "illumination), or auto: path or product, whichever has the lower error in a short comparison after "
+                 "training")
       ->transform(oneOf(kIntegratorNames))
       ->default_str("auto");
+  declareBidirectional(app, options);
   app.add_option("--spp", job.samples, "Number of samples per pixel");
   app.add_option("--sample-offset", job.sampleOffset,
                  "Index of the first sample, to render parts of a picture for lobecompare --merge")
@@ -164,7 +188,8 @@ void declare(CLI::App& app, Options& options) {
       app.add_flag("--check", options.check,
                    "Only read the scene and print all faults, warnings and notes; exit with 1 if it cannot be read");
   app.add_flag("--json", options.json, "Print the result of --check as JSON")->needs(check);
-  options.guidedOnly = {app.get_option("--reduction"), app.get_option("--russian-roulette")};
+  options.reduction = app.get_option("--reduction");
+  options.roulette = app.get_option("--russian-roulette");
   declareTraining(app, options);
   addDefinitions(app, job.definitions);
   addThreads(app, options.threads);
@@ -172,18 +197,19 @@ void declare(CLI::App& app, Options& options) {
 
 /// Options that the integrator ignores are not errors, so that a script can pass the same options to all integrators.
 void noteUnused(const Options& options) {
-  const IntegratorKind integrator = options.job.integrator;
+  const RenderJob& job = options.job;
   std::vector<std::string> unused;
-  for (const CLI::Option* option : options.training) {
-    const bool used = integrator == IntegratorKind::product || integrator == IntegratorKind::automatic ||
-                      (integrator == IntegratorKind::guided && option->get_name() != "--bsdf-fraction");
+  const auto note = [&](const CLI::Option* option, bool used) {
     if (option->count() > 0 && !used) unused.push_back(option->get_name());
-  }
-  if (integrator == IntegratorKind::path)
-    for (const CLI::Option* option : options.guidedOnly)
-      if (option->count() > 0) unused.push_back(option->get_name());
+  };
+  note(options.guide, job.integrator == IntegratorKind::bdpt);
+  for (const CLI::Option* option : options.merging) note(option, job.integrator == IntegratorKind::vcm);
+  for (const CLI::Option* option : options.training)
+    note(option, option->get_name() == "--bsdf-fraction" ? job.mayUseProduct() : job.guided());
+  note(options.reduction, job.guided());
+  note(options.roulette, job.guided() && job.integrator != IntegratorKind::bdpt);
   if (!unused.empty())
-    printNote("loberender", fmt::format("--integrator {} ignores {}", nameOf(integrator), fmt::join(unused, ", ")));
+    printNote("loberender", fmt::format("--integrator {} ignores {}", nameOf(job.integrator), fmt::join(unused, ", ")));
 }
 
 void work(Options& options) {

@@ -12,6 +12,7 @@
 #include <new>
 #include <numeric>
 #include <stdexcept>
+#include <variant>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -24,8 +25,8 @@
 #include "runtime/core/stopwatch.h"
 #include "runtime/image/error_metrics.h"
 #include "runtime/image/image_output.h"
+#include "runtime/render/integrators/bidirectional_integrator.h"
 #include "runtime/render/integrators/learn_sample_counts.h"
-#include "runtime/render/integrators/path_integrator.h"
 #include "runtime/render/integrators/pilot.h"
 #include "runtime/render/integrators/renderer.h"
 #include "runtime/render/training/light_learning.h"
@@ -45,11 +46,6 @@ constexpr const char* kTool = "loberender";
 // after 21 seconds.
 constexpr double kTrainingFraction = 0.15;
 constexpr std::int64_t kMaxPixels = 1 << 28;  // larger sizes are assumed to be typing errors
-
-/// Whether the integrator may sample the product.
-bool mayUseProduct(IntegratorKind kind) {
-  return kind == IntegratorKind::product || kind == IntegratorKind::automatic;
-}
 
 /// Quotes the word for the shell if necessary.
 std::string quoted(const std::string& word) {
@@ -91,7 +87,7 @@ void checkFiles(const RenderJob& job) {
 /// Checks that no output replaces a file of the scene or a BRDF cache.
 void checkSceneFiles(const RenderJob& job, const Scene& scene) {
   std::vector<std::filesystem::path> read = scene.files;
-  if (mayUseProduct(job.integrator))
+  if (job.mayUseProduct())
     for (const LobeRequest& request : lobeRequests(scene))
       read.push_back(job.cacheFolder / lobeFileName(request.model, request.key));
   for (const auto& path : writtenBy(job)) checkNotRead(path, read);
@@ -182,8 +178,8 @@ struct Pilot {
   }
 };
 
-/// BRDF caches and trained illumination; both are empty for `path`. Cannot be moved, because the sampler refers to the
-/// other members.
+/// BRDF caches and trained illumination; both are empty without guiding. Cannot be moved, because the samplers refer to
+/// the other members.
 struct Guiding {
   Guiding() = default;
   Guiding(const Guiding&) = delete;
@@ -192,6 +188,7 @@ struct Guiding {
   std::optional<LobeCacheSet> caches;
   TrainedIllumination training;
   std::optional<GuidedSampler> sampler;
+  std::optional<GuidedSampler> lightSampler;  ///< of the light paths of bdpt
   std::optional<SampleCountModel> counts;
   double secondsLights = 0;  ///< time for learning the choice of lights
   double secondsCounts = 0;  ///< time for learning the counts
@@ -315,6 +312,7 @@ TrainingPlan planOf(const RenderJob& job) {
   TrainingPlan plan = job.training;
   plan.seed = job.seed;
   plan.keepParticles = job.record.has_value();
+  plan.keepImportance = job.integrator == IntegratorKind::bdpt;
   plan.seconds = job.trainSeconds.value_or(job.seconds ? kTrainingFraction * *job.seconds : kInfinity);
   // If the time is limited and --passes is not given, only the time limits the number of passes.
   plan.passes = job.passes.value_or(plan.seconds < kInfinity ? std::numeric_limits<int>::max() : plan.passes);
@@ -341,7 +339,12 @@ RunSettings settingsOf(const RenderJob& job, const Scene& scene, const Guiding& 
                   {"--max-depth", job.maxDepth ? std::to_string(*job.maxDepth) : "that of the scene"},
                   {"--shadow-surfaces", std::to_string(job.shadowSurfaces)},
                   {"the hash of scene and camera", fmt::format("{:016x}", pictureHash(scene))}};
-  if (job.integrator == IntegratorKind::path) return all;
+  if (job.integrator == IntegratorKind::bdpt) all.emplace_back("--guide", nameOf(job.guide));
+  if (job.integrator == IntegratorKind::vcm) {
+    all.emplace_back("--merge-radius", fmt::format("{}", job.merge.first));
+    all.emplace_back("--merge-alpha", fmt::format("{}", job.merge.alpha));
+  }
+  if (!job.guided()) return all;
   const TrainingPlan& plan = job.training;
   const auto names = trainFromNames();
   const auto from = std::ranges::find(names, plan.from, [](const auto& entry) { return entry.second; });
@@ -414,8 +417,11 @@ PathOptions pathOptions(const RenderJob& job, const Scene& scene) {
   return options;
 }
 
-std::unique_ptr<Integrator> makeIntegrator(const RenderJob& job, const RenderScene& scene, const RayCamera& camera,
-                                           Guiding& guiding) {
+using AnyIntegrator = std::variant<std::unique_ptr<Integrator>, std::unique_ptr<BidirectionalIntegrator>>;
+
+/// path, guided or product.
+std::unique_ptr<Integrator> makeUnidirectional(const RenderJob& job, const RenderScene& scene, const RayCamera& camera,
+                                               Guiding& guiding) {
   PathOptions options = pathOptions(job, scene.scene);
   auto path = std::make_unique<PathIntegrator>(scene, options);
   if (!guiding.sampler) return path;
@@ -437,6 +443,27 @@ std::unique_ptr<Integrator> makeIntegrator(const RenderJob& job, const RenderSce
   return guided;
 }
 
+std::unique_ptr<BidirectionalIntegrator> makeBdpt(const RenderJob& job, const RenderScene& scene,
+                                                  const RayCamera& camera, const Guiding& guiding) {
+  const PathOptions options = pathOptions(job, scene.scene);
+  if (!guiding.sampler) return std::make_unique<BdptIntegrator>(scene, camera, options);
+  return std::make_unique<GuidedBdptIntegrator>(scene, camera, options, *guiding.sampler, *guiding.lightSampler);
+}
+
+std::unique_ptr<BidirectionalIntegrator> makeVcm(const RenderJob& job, const RenderScene& scene,
+                                                 const RayCamera& camera) {
+  const float diagonal = scene.tracer.bounds().isEmpty() ? 1.0f : scene.tracer.bounds().diagonal().norm();
+  const MergeRadius radius{job.merge.first * diagonal, job.merge.alpha};
+  return std::make_unique<VcmIntegrator>(scene, camera, pathOptions(job, scene.scene), radius);
+}
+
+AnyIntegrator makeIntegrator(const RenderJob& job, const RenderScene& scene, const RayCamera& camera,
+                             Guiding& guiding) {
+  if (job.integrator == IntegratorKind::bdpt) return makeBdpt(job, scene, camera, guiding);
+  if (job.integrator == IntegratorKind::vcm) return makeVcm(job, scene, camera);
+  return makeUnidirectional(job, scene, camera, guiding);
+}
+
 /// One run, step by step. Cannot be moved, because members refer to others.
 class Run {
  public:
@@ -453,6 +480,7 @@ class Run {
 
  private:
   void readCheckpoint();
+  void readStored(const IlluminationFile& file);
   void readIllumination(const IlluminationFile& file, const std::filesystem::path& path);
   void makeGuiding();
   void saveTraining();
@@ -474,9 +502,10 @@ class Run {
   std::optional<RayCamera> camera_;
   std::optional<ConvergenceLog> log_;
   Guiding guiding_;
-  std::vector<std::byte> illumination_;  ///< for checkpoints and --save-illumination: the content of an .illum file
+  // For checkpoints and --save-illumination: the content of .illum files.
+  std::vector<std::byte> illumination_, importance_;
   RunSettings settings_;
-  std::unique_ptr<Integrator> integrator_;
+  AnyIntegrator integrator_;
   std::optional<Film> film_;
   RenderResult result_;
   OutputErrors errors_;
@@ -492,13 +521,13 @@ void Run::prepare() {
   load_.reading = reading.seconds();
   checkSceneFiles(job_, *scene_);
   log_.emplace(job_, *scene_);
-  if (mayUseProduct(job_.integrator))
+  if (job_.mayUseProduct())
     guiding_.caches.emplace(job_.cacheFolder, lobeRequests(*scene_), lobefitCommand(job_), job_.reduction);
   settings_ = settingsOf(job_, *scene_, guiding_, stored);
   if (resumed_)
     readCheckpoint();
   else if (stored)
-    readIllumination(*stored, job_.illumination);
+    readStored(*stored);
   const Stopwatch building;
   renderScene_.emplace(*scene_, job_.shadowSurfaces);
   load_.building = building.seconds();
@@ -511,7 +540,7 @@ void Run::prepare() {
   if (!job_.checkpoint.empty() && film_->pixels().size() > kMaxCheckpointPixels)
     throw std::runtime_error(fmt::format("--checkpoint: a checkpoint holds at most {} pixels", kMaxCheckpointPixels));
   const std::optional<Receiver> receiver = receiverFor(job_, *renderScene_, *camera_);
-  if (job_.integrator != IntegratorKind::path) makeGuiding();
+  if (job_.guided()) makeGuiding();
   if (receiver) drawRecord(job_, *renderScene_, *receiver, guiding_.training);
   integrator_ = makeIntegrator(job_, *renderScene_, *camera_, guiding_);
 }
@@ -527,16 +556,24 @@ void Run::readCheckpoint() {
   if (job_.samples && most > static_cast<std::uint32_t>(*job_.samples))
     throw std::runtime_error(fmt::format("{}: has {} samples per pixel already, more than --spp {}",
                                          job_.resume.string(), most, *job_.samples));
-  if (job_.integrator != IntegratorKind::path)
-    readIllumination(IlluminationFile::parse(resumed_->illumination(), job_.resume), job_.resume);
+  if (job_.guided()) readIllumination(IlluminationFile::parse(resumed_->illumination(), job_.resume), job_.resume);
+  if (!resumed_->importance().empty())
+    guiding_.training.importance =
+        restoreIllumination(IlluminationFile::parse(resumed_->importance(), job_.resume), job_.resume, *scene_).field;
   guiding_.training.report = trainingOf(*resumed_);
   printNote(kTool, fmt::format("{}: continues with sample {} of each pixel", job_.resume.string(), least + 1));
+}
+
+void Run::readStored(const IlluminationFile& file) {
+  readIllumination(file, job_.illumination);
+  if (job_.integrator == IntegratorKind::bdpt)
+    printNote(kTool, fmt::format("{}: holds no importance, so light paths are not guided", job_.illumination.string()));
 }
 
 void Run::readIllumination(const IlluminationFile& file, const std::filesystem::path& path) {
   const Stopwatch restoring;
   guiding_.training = restoreIllumination(file, path, *scene_);
-  if (mayUseProduct(job_.integrator) && job_.training.learnFractions && !guiding_.training.report.learntFractions)
+  if (job_.mayUseProduct() && job_.training.learnFractions && !guiding_.training.report.learntFractions)
     printNote(kTool, fmt::format("{}: the records have learnt no BSDF sampling fractions (trained by guided, or with "
                                  "--bsdf-fraction fixed); all use {:.1f}",
                                  path.string(), kInitialBsdfFraction));
@@ -548,8 +585,12 @@ void Run::makeGuiding() {
   if (!resumed_ && job_.illumination.empty()) train(plan, *renderScene_, *camera_, guiding_);
   if (!job_.checkpoint.empty() || !job_.saveIllumination.empty())
     illumination_ = encodeIllumination(guiding_.training, plan, *scene_, job_.scene);
+  if (!job_.checkpoint.empty() && guiding_.training.importance.records() > 0)
+    importance_ =
+        encodeIllumination({guiding_.training.importance, guiding_.training.report, {}, {}}, plan, *scene_, job_.scene);
   guiding_.reduceRecords(job_.reduction);
   guiding_.sampler.emplace(*scene_, guiding_.training.field, guiding_.cachesOrNull());
+  guiding_.lightSampler.emplace(*scene_, guiding_.training.importance, nullptr);
 }
 
 /// Writes what a later run would have to train again otherwise. Failures do not prevent rendering.
@@ -596,16 +637,18 @@ void Run::render() {
   Progress progress("rendering", 1);
   double done = 0;
   sinceSnapshot_ = Stopwatch();
-  result_ = lobe::render(
-      *camera_, *integrator_, *film_, options(),
-      [&](const RenderResult& result) {
-        result_ = result;
-        progress.advance(fractionDone() - done);
-        done = fractionDone();
-        log_->add(*film_, prepared() + result.total.seconds, result.total.samples);
-        if (snapshotIsDue()) snapshot();
+  const auto afterWave = [&](const RenderResult& result) {
+    result_ = result;
+    progress.advance(fractionDone() - done);
+    done = fractionDone();
+    log_->add(*film_, prepared() + result.total.seconds, result.total.samples);
+    if (snapshotIsDue()) snapshot();
+  };
+  result_ = std::visit(
+      [&](const auto& integrator) {
+        return lobe::render(*camera_, *integrator, *film_, options(), afterWave, result_);
       },
-      result_);
+      integrator_);
 }
 
 void Run::writeOutputs(OutputErrors& errors) const {
@@ -623,7 +666,7 @@ void Run::writeCheckpoint(OutputErrors& errors) const {
   if (job_.checkpoint.empty()) return;
   errors.attempt(job_.checkpoint, [&] {
     const std::vector<std::byte> bytes =
-        encodeCheckpoint(settings_, *film_, result_, guiding_.training.report, illumination_);
+        encodeCheckpoint(settings_, *film_, result_, guiding_.training.report, illumination_, importance_);
     writeAtomically(job_.checkpoint, std::span<const std::byte>(bytes));
   });
 }
@@ -652,8 +695,23 @@ void Run::finish() {
 }  // namespace
 
 const char* nameOf(IntegratorKind kind) {
-  constexpr std::array names{"auto", "path", "guided", "product"};
+  constexpr std::array names{"auto", "path", "bdpt", "vcm", "guided", "product"};
   return names[static_cast<std::size_t>(kind)];
+}
+
+const char* nameOf(BdptGuide guide) {
+  constexpr std::array names{"none", "illumination", "product"};
+  return names[static_cast<std::size_t>(guide)];
+}
+
+bool RenderJob::guided() const {
+  return integrator == IntegratorKind::bdpt ? guide != BdptGuide::none
+                                            : integrator == IntegratorKind::guided || mayUseProduct();
+}
+
+bool RenderJob::mayUseProduct() const {
+  if (integrator == IntegratorKind::bdpt) return guide == BdptGuide::product;
+  return integrator == IntegratorKind::product || integrator == IntegratorKind::automatic;
 }
 
 void RenderJob::validate() const {
@@ -668,8 +726,8 @@ void RenderJob::validate() const {
           "--sample-offset requires --spp, because --seconds does not fix the number of samples");
   require(!samples || *samples <= std::numeric_limits<int>::max() - sampleOffset,
           fmt::format("the sum of --sample-offset and --spp must be at most {}", std::numeric_limits<int>::max()));
-  require(integrator != IntegratorKind::path || (illumination.empty() && saveIllumination.empty()),
-          "--illumination and --save-illumination require --integrator auto, guided or product");
+  require(guided() || (illumination.empty() && saveIllumination.empty()),
+          "--illumination and --save-illumination require --integrator auto, guided or product, or bdpt with --guide");
   require(illumination.empty() || saveIllumination.empty(),
           "--save-illumination cannot be combined with --illumination, which replaces training");
   require(!seconds || (*seconds > 0 && std::isfinite(*seconds)), "--seconds must be a finite number greater than 0");
@@ -683,7 +741,9 @@ void RenderJob::validate() const {
   require(reference.empty() == convergence.empty(), "--reference and --convergence require each other");
   require(reduction >= 0 && std::isfinite(reduction), "--reduction must be a finite number of at least 0");
   require(!outputs.empty(), "-o FILE is required");
-  require(!record || integrator != IntegratorKind::path, "--record requires --integrator auto, guided or product");
+  require(!record || guided(), "--record requires --integrator auto, guided or product, or bdpt with --guide");
+  require(merge.first > 0 && std::isfinite(merge.first), "--merge-radius must be a finite number greater than 0");
+  require(merge.alpha > 0 && merge.alpha <= 1, "--merge-alpha must be greater than 0 and at most 1");
   require(!snapshotEvery || (*snapshotEvery >= 0 && std::isfinite(*snapshotEvery)),
           "--snapshot-every must be a finite number of at least 0");
   require(resume.empty() || !record, "--record cannot be combined with --resume, because the particles are not stored");

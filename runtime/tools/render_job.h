@@ -10,16 +10,21 @@
 
 #include "runtime/core/stop.h"
 #include "runtime/image/image.h"
-#include "runtime/render/integrators/path_loop.h"
+#include "runtime/render/integrators/bidirectional_integrator.h"
 #include "runtime/render/integrators/renderer.h"
 #include "runtime/render/training/training.h"
 
 namespace lobe {
 
 /// automatic: path or product, whichever reaches the lower error in a pilot (pilot.h).
-enum class IntegratorKind { automatic, path, guided, product };
+enum class IntegratorKind { automatic, path, bdpt, vcm, guided, product };
 /// The name that the option has.
 const char* nameOf(IntegratorKind kind);
+
+/// What guides the paths of bdpt: nothing; illumination and importance; or, on camera paths, the product.
+enum class BdptGuide { none, illumination, product };
+/// The name that the option has.
+const char* nameOf(BdptGuide guide);
 
 /// Russian roulette by the path's throughput, or efficiency-aware Russian roulette and splitting (sample_counts.h).
 enum class RussianRoulette { throughput, efficiency };
@@ -32,6 +37,9 @@ struct RenderJob {
   std::vector<std::filesystem::path> outputs;
 
   IntegratorKind integrator = IntegratorKind::automatic;
+  BdptGuide guide = BdptGuide::none;  ///< only used by bdpt
+  /// Radius of vertex merging of vcm in the first sample, as a fraction of the scene's diagonal, and how it shrinks.
+  MergeRadius merge{0.0015f, 0.75f};
   std::optional<int> samples;     ///< per pixel; exactly one of samples and seconds is set
   int sampleOffset = 0;           ///< index of the first sample of every pixel
   std::optional<double> seconds;  ///< for training and rendering together
@@ -60,6 +68,11 @@ struct RenderJob {
 
   std::optional<std::pair<int, int>> record;         ///< pixel whose illumination record is plotted
   std::filesystem::path recordImage = "record.png";  ///< file of the plot
+
+  /// Whether illumination is trained, from which the integrator may sample directions.
+  bool guided() const;
+  /// Whether directions may be sampled from the product, which needs BRDF caches.
+  bool mayUseProduct() const;
 
   /// Throws UsageError that names the option.
   void validate() const;

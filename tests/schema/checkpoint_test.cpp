@@ -17,8 +17,8 @@ namespace {
 struct Content {
   CheckpointInfo info;
   std::vector<StoredPixel> pixels;
-  std::vector<std::byte> illumination;
-  std::vector<std::byte> encode() const { return encodeCheckpoint(info, pixels, illumination); }
+  std::vector<std::byte> illumination, importance;
+  std::vector<std::byte> encode() const { return encodeCheckpoint(info, pixels, illumination, importance); }
 };
 
 Content smallFile() {
@@ -26,6 +26,7 @@ Content smallFile() {
   c.info = {{{"--seed", "7"}, {"the size", "2x1"}}, 2, 1, 1.5, 2.5, {{0.5, 1000, 20, -1.25}}, 0.25, true, {3, 4, 5}};
   c.pixels = {{{1, 2, 3}, {4, 5, 6}, 7, 1}, {{0, 0, 0}, {0, 0, 0}, 0, 0}};
   c.illumination = {std::byte{1}, std::byte{2}};
+  c.importance = {std::byte{3}};
   return c;
 }
 
@@ -62,6 +63,7 @@ TEST_CASE("schema: a checkpoint reads back as written") {
          info.passes[0].logLikelihood == -1.25));
   CHECK(std::ranges::equal(std::as_bytes(file.pixels()), std::as_bytes(std::span(c.pixels))));
   CHECK(std::ranges::equal(file.illumination(), c.illumination));
+  CHECK(std::ranges::equal(file.importance(), c.importance));
 }
 
 TEST_CASE("schema: the layout of checkpoints matches the FlatBuffers schema") {

@@ -151,7 +151,7 @@ TEST_CASE("loberender: invalid command lines are errors") {
       {" --spp 1 --max-depth 0", "--max-depth"},
       {" --spp 1 --seed -1", "--seed"},
       {" --spp 1 --seed 18446744073709551616", "--seed"},
-      {" --spp 1 --integrator 1", "auto, path, guided, product"},
+      {" --spp 1 --integrator 1", "auto, path, bdpt, vcm, guided, product"},
       {" --spp 1 --reference a.exr", "--convergence"},
       {" --spp 1 --convergence a.csv", "--reference"},
       {" --spp 1 --integrator magic", "--integrator"},
@@ -163,6 +163,10 @@ TEST_CASE("loberender: invalid command lines are errors") {
       {" --spp 1 -o b.jpg", "b.jpg"},
       {" --spp 1 -o a.exr", "a.exr"},
       {" --spp 1 --stats scene.xml", "scene.xml"},
+      {" --spp 1 --guide magic", "--guide"},
+      {" --spp 1 --integrator vcm --merge-radius 0", "--merge-radius"},
+      {" --spp 1 --integrator vcm --merge-alpha 1.5", "--merge-alpha"},
+      {" --spp 1 --integrator vcm --save-illumination a.illum", "bdpt with --guide"},
       {" --spp 1 --unknown", "--unknown"}};
   for (const auto& [options, word] : cases)
     CHECK_THAT(fault(folder, "loberender scene.xml -o a.exr" + options, 2), Catch::Contains(word));
@@ -221,6 +225,22 @@ TEST_CASE("loberender: images do not depend on the number of threads and store t
   CHECK(hashes.size() == 2 * 16 + 1);
   for (const fs::path& cache : folder.caches())
     CHECK_THAT(hashes, Catch::Contains(fmt::format("{:016x}", LobeCache::open(cache).hash())));
+}
+
+TEST_CASE("loberender: bidirectional pictures do not depend on the number of threads, guided or not") {
+  const SceneFolder folder(true);
+  const std::string guide = GENERATE("none", "illumination", "product");
+  const std::string render = "loberender scene.xml --integrator bdpt --spp 4 --seed 9 --guide " + guide + kTraining;
+  for (const std::string threads : {"1", "2", "7"})
+    REQUIRE(folder.run(render + " --threads " + threads + " -o " + threads + ".exr --stats s.json").code == 0);
+  CHECK(folder.bytes("1.exr") == folder.bytes("2.exr"));
+  CHECK(folder.bytes("1.exr") == folder.bytes("7.exr"));
+  const auto s = nlohmann::json::parse(folder.bytes("s.json"));
+  CHECK(s.at("integrator") == "bdpt");
+  CHECK((s.at("records") > 0) == (guide != "none"));
+  CHECK(s.at("nonfinite_samples") == 0);
+  CHECK(folder.run("loberender scene.xml --integrator path --spp 1 -o a.exr --guide product")
+            .error.find("--integrator path ignores --guide") != std::string::npos);
 }
 
 TEST_CASE("loberender: statistics and convergence and images of a run") {

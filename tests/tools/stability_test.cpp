@@ -137,8 +137,8 @@ TEST_CASE("tools: a wrong name of a value is one line with the permitted names")
   const SceneFolder folder(false);
   for (const auto& [option, names] :
        {std::pair("--sampler", "sobol, independent"), std::pair("--russian-roulette", "throughput, efficiency"),
-        std::pair("--integrator", "auto, path, guided, product"), std::pair("--bsdf-fraction", "fixed, learnt"),
-        std::pair("--train", "both, paths, photons")}) {
+        std::pair("--integrator", "auto, path, bdpt, vcm, guided, product"),
+        std::pair("--bsdf-fraction", "fixed, learnt"), std::pair("--train", "both, paths, photons")}) {
     const std::string line = fault(folder, kRender + " " + option + " bogus", 2);
     CHECK_THAT(line, Contains(std::string(option) + ": must be one of " + names + ", not 'bogus'"));
     CHECK_THAT(fault(folder, kRender + " " + option + " 1", 2), Contains("must be one of"));
@@ -275,9 +275,12 @@ TEST_CASE("loberender: a second interruption ends at once") {
 
 TEST_CASE("loberender: a resumed render has the bytes of an uninterrupted one") {
   const SceneFolder folder(true);
-  for (const std::string integrator : {"path", "guided", "product"}) {
+  for (const std::string integrator :
+       {"path", "bdpt", "vcm --merge-radius 0.05", "guided", "product", "bdpt --guide illumination"}) {
+    const bool trained =
+        integrator.ends_with("guided") || integrator.ends_with("product") || integrator.ends_with("illumination");
     const std::string render =
-        "loberender scene.xml --size 32x24 --integrator " + integrator + (integrator == "path" ? "" : kTraining);
+        "loberender scene.xml --size 32x24 --integrator " + integrator + (trained ? kTraining : "");
     REQUIRE(folder.run(render + " --spp 6 -o whole.exr --stats whole.json").code == 0);
     REQUIRE(folder.run(render + " --spp 2 -o part.exr --checkpoint run.ckpt").code == 0);
     const ToolRun resumed = folder.run(
@@ -314,6 +317,16 @@ TEST_CASE("loberender: a checkpoint of another run is refused") {
            {" --reduction 0.1", "--reduction was 0"},
            {" --components 4", "--components was 8"}})
     CHECK_THAT(refusal(render + options), Contains("run.ckpt: a checkpoint of another run: ") && Contains(what));
+  for (const auto& [was, now] : std::vector<std::pair<std::string, std::string>>{
+           {"bdpt --passes 1 --photons 2000 --guide illumination", "bdpt --passes 1 --photons 2000 --guide product"},
+           {"vcm --merge-radius 0.01", "vcm --merge-radius 0.02"},
+           {"vcm --merge-alpha 0.5", "vcm --merge-alpha 0.75"}}) {
+    const std::string option = was.substr(was.rfind("--"), was.rfind(' ') - was.rfind("--"));
+    const std::string start = "loberender scene.xml -o a.exr --spp 2 --integrator ";
+    REQUIRE(folder.run(start + was + " --checkpoint other.ckpt").code == 0);
+    CHECK_THAT(fault(folder, start + now + " --resume other.ckpt", 1),
+               Contains("another run: " + option + " was " + was.substr(was.rfind(' ') + 1)));
+  }
   CHECK_THAT(refusal("loberender other.xml -o a.exr --spp 2" + kTraining),
              Contains("the hash of scene and camera was"));
   CHECK_THAT(refusal("loberender scene.xml -o a.exr --spp 2 --illumination a.illum"), Contains("another run"));
