@@ -386,7 +386,9 @@ TEST_CASE("render: samples of filters have the moments of the filters") {
   CHECK(deviation(moments({PixelFilter::Kind::mitchell, 2.0f, 0, 0.0f, 0.5f}), 2.0 / 13) < kMaxDeviation);
   const auto second = [](const auto& filter, double radius) {
     double sum = 0, squares = 0;
-    for (double x = 1e-4; x < radius; x += 2e-4) {
+    constexpr double kStep = 2e-4;
+    for (int i = 0; i < static_cast<int>(radius / kStep); ++i) {
+      const double x = (i + 0.5) * kStep;
       sum += std::max(0.0, filter(x));
       squares += std::max(0.0, filter(x)) * x * x;
     }
