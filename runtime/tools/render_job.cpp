@@ -392,13 +392,12 @@ void drawRecord(const RenderJob& job, const RenderScene& scene, const Receiver& 
   training.particles = {};  // not needed any more; frees memory for rendering
 }
 
-/// The fraction of a full-sized pilot, and of the paths for learning counts, that suits a run: both shall take a few
-/// percent of the time of rendering.
-double preparationSize(const RenderJob& job, const RayCamera& camera) {
-  constexpr double kLeast = 0.2, kSeconds = 10, kPaths = 3e6;
-  const double size = job.seconds ? *job.seconds / kSeconds
-                                  : static_cast<double>(*job.samples) * camera.width() * camera.height() / kPaths;
-  return std::clamp(size, kLeast, 1.0);
+/// The fraction of a full-sized pilot, and of the paths for learning counts, so that both take a few percent of the
+/// time of a short run. With --spp it does not depend on the number of samples, so that parts of a picture
+/// (--sample-offset) use the same counts and the same integrator.
+double preparationSize(const RenderJob& job) {
+  constexpr double kLeast = 0.2, kSeconds = 10;
+  return job.seconds ? std::clamp(*job.seconds / kSeconds, kLeast, 1.0) : 1.0;
 }
 
 void learnCounts(const RenderJob& job, const RenderScene& scene, const RayCamera& camera, const PathOptions& options,
@@ -406,7 +405,7 @@ void learnCounts(const RenderJob& job, const RenderScene& scene, const RayCamera
   constexpr double kPaths = 100000;
   const Stopwatch watch;
   guiding.counts = learnSampleCounts(scene, camera, options, *guiding.sampler, guiding.training.field.records(),
-                                     static_cast<int>(kPaths * preparationSize(job, camera)), job.seed);
+                                     static_cast<int>(kPaths * preparationSize(job)), job.seed);
   guiding.secondsCounts = watch.seconds();
 }
 
@@ -433,7 +432,7 @@ std::unique_ptr<Integrator> makeUnidirectional(const RenderJob& job, const Rende
   if (job.integrator != IntegratorKind::automatic) return guided;
   const Stopwatch watch;
   PilotOptions pilot;
-  pilot.tiles = static_cast<int>(pilot.tiles * preparationSize(job, camera));
+  pilot.tiles = static_cast<int>(pilot.tiles * preparationSize(job));
   pilot.seed = job.seed;
   // The same picture for a seed is only promised for --spp.
   pilot.timed = job.seconds.has_value();
