@@ -6,7 +6,7 @@
 #include <oneapi/tbb/global_control.h>
 
 #include "runtime/tools/check_report.h"
-#include "runtime/tools/render_job.h"
+#include "runtime/tools/render_run.h"
 #include "runtime/tools/tool.h"
 
 namespace {

@@ -1,5 +1,5 @@
 #pragma once
-// A run of loberender, from the options to the output files.
+// The options of a run of loberender.
 
 #include <cstddef>
 #include <filesystem>
@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "runtime/core/stop.h"
 #include "runtime/image/image.h"
 #include "runtime/render/integrators/bidirectional_integrator.h"
 #include "runtime/render/integrators/renderer.h"
@@ -80,10 +79,5 @@ struct RenderJob {
 
 /// The lobefit command that makes the caches for a job, for error messages.
 std::string lobefitCommand(const RenderJob& job);
-
-/// Reads the scene, trains, renders and writes all outputs; diagnostics go to stderr. An output that cannot be written
-/// does not prevent the others from being written. Throws std::runtime_error. If stop is set, ends early and throws
-/// Stopped: in training, nothing is written; in rendering, the outputs show the samples so far.
-void run(const RenderJob& job, const StopFlag& stop);
 
 }  // namespace lobe

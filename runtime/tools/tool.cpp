@@ -4,9 +4,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <cmath>
 #include <csignal>
+#include <cstring>
 #include <iostream>
 #include <new>
 #include <string_view>
@@ -183,6 +185,14 @@ void printWarning(const std::string& name, const std::string& message) {
 
 void printNote(const std::string& name, const std::string& message) {
   printDiagnostic(fmt::format("{}: note: {}\n", name, message));
+}
+
+std::string shellQuoted(const std::string& word) {
+  const auto safe = [](unsigned char c) { return std::isalnum(c) || c >= 0x80 || std::strchr("/._-=+,:@%", c); };
+  if (!word.empty() && std::ranges::all_of(word, safe)) return word;
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? "'\\''" : std::string(1, c);
+  return text + "'";
 }
 
 void checkNotRead(const std::filesystem::path& output, const std::vector<std::filesystem::path>& inputs) {

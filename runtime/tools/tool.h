@@ -54,6 +54,9 @@ void printWarning(const std::string& name, const std::string& message);
 /// Prints "NAME: note: MESSAGE" to stderr.
 void printNote(const std::string& name, const std::string& message);
 
+/// Quotes the word for the shell if necessary.
+std::string shellQuoted(const std::string& word);
+
 /// Throws UsageError if writing output would overwrite one of the inputs, also by other names of the same file.
 void checkNotRead(const std::filesystem::path& output, const std::vector<std::filesystem::path>& inputs);
 

@@ -20,7 +20,7 @@
 
 #include "fitter/compile.h"
 #include "runtime/image/image.h"
-#include "runtime/tools/render_job.h"
+#include "runtime/tools/render_run.h"
 #include "scenes/mitsuba/reader.h"
 #include "scenes/scene_lobes.h"
 #include "schema/checkpoint_file.h"

@@ -1,0 +1,326 @@
+#include "runtime/tools/render_run.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "runtime/analysis/record_view.h"
+#include "runtime/core/atomic_file.h"
+#include "runtime/core/stopwatch.h"
+#include "runtime/image/image_output.h"
+#include "runtime/render/integrators/renderer.h"
+#include "runtime/render/training/light_learning.h"
+#include "runtime/tools/checkpoint.h"
+#include "runtime/tools/json_text.h"
+#include "runtime/tools/render_files.h"
+#include "runtime/tools/render_report.h"
+#include "runtime/tools/render_setup.h"
+#include "runtime/tools/stored_illumination.h"
+#include "runtime/tools/tool.h"
+#include "scenes/camera.h"
+#include "scenes/mitsuba/reader.h"
+#include "scenes/scene_hash.h"
+
+namespace lobe {
+namespace {
+
+constexpr const char* kTool = "loberender";
+
+Scene readFor(const RenderJob& job) {
+  Progress progress("reading", 1.0);
+  Scene scene =
+      readScene(job.scene, {job.definitions, job.lenient, true, [&](double fraction) { progress.advance(fraction); }});
+  for (const std::string& note : scene.notes) printNote(kTool, note);
+  for (const std::string& warning : scene.warnings) printWarning(kTool, warning);
+  const bool shines = std::ranges::any_of(scene.shapes, [](const Shape& shape) { return shape.emitter.has_value(); });
+  if (!shines && !scene.environment && scene.lights.empty())
+    printWarning(kTool, fmt::format("{}: the scene has no light sources, so the picture is black", job.scene.string()));
+  if (job.size) {
+    if (scene.camera.crop)
+      printWarning(kTool, "--size sets the size of the whole film; the crop window in the scene file is ignored");
+    scene.camera.crop.reset();
+    scene.camera.width = job.size->first;
+    scene.camera.height = job.size->second;
+    scene.camera.horizontalFov = horizontalFov(scene.camera, scene.camera.width, scene.camera.height);
+  }
+  return scene;
+}
+
+std::string recordFault(const RenderJob& job, const NoRecord& e) {
+  return fmt::format("--record {},{}: {}", job.record->first, job.record->second, e.what());
+}
+
+/// The surface seen in the pixel of --record.
+std::optional<Receiver> receiverFor(const RenderJob& job, const RenderScene& scene, const RayCamera& camera) {
+  if (!job.record) return std::nullopt;
+  try {
+    return receiverAt(scene, camera, job.record->first, job.record->second);
+  } catch (const NoRecord& e) {
+    throw std::runtime_error(recordFault(job, e));
+  }
+}
+
+/// Draws the record of --record. If no record serves the surface, prints a warning and the run continues.
+void drawRecord(const RenderJob& job, const RenderScene& scene, const Receiver& receiver,
+                TrainedIllumination& training) {
+  try {
+    const RecordView view = viewRecord(scene, receiver, training, job.training.records);
+    view.raster.write(job.recordImage);
+    std::string line = view.caption;
+    std::ranges::replace(line, '\n', ' ');
+    printNote(kTool, fmt::format("{}: {}", job.recordImage.string(), line));
+  } catch (const NoRecord& e) {
+    printWarning(kTool, recordFault(job, e));
+  }
+  training.particles = {};  // not needed any more; frees memory for rendering
+}
+
+/// One run, step by step. Cannot be moved, because members refer to others.
+class Run {
+ public:
+  Run(const RenderJob& job, const StopFlag& stop) : job_(job), stop_(stop) {}
+  Run(const Run&) = delete;
+  Run& operator=(const Run&) = delete;
+
+  /// Everything before the first sample. Writes only the plot of a record.
+  void prepare();
+  /// Renders, with snapshots, until the end or until it is stopped.
+  void render();
+  /// Writes the outputs, and throws if one of them cannot be written, or if the run was stopped.
+  void finish();
+
+ private:
+  void readCheckpoint();
+  void readStored(const IlluminationFile& file);
+  void readIllumination(const IlluminationFile& file, const std::filesystem::path& path);
+  void makeGuiding();
+  void saveTraining();
+  RenderOptions options() const;
+  double fractionDone() const;
+  bool snapshotIsDue() const;
+  void snapshot();
+  void writeOutputs(OutputErrors& errors) const;
+  void writeCheckpoint(OutputErrors& errors) const;
+  std::string stopMessage() const;
+  double prepared() const { return guiding_.seconds(); }
+
+  const RenderJob& job_;
+  const StopFlag& stop_;
+  LoadTimes load_;
+  std::optional<CheckpointFile> resumed_;
+  std::optional<Scene> scene_;
+  std::optional<RenderScene> renderScene_;
+  std::optional<RayCamera> camera_;
+  std::optional<ConvergenceLog> log_;
+  Guiding guiding_;
+  // For checkpoints and --save-illumination: the content of .illum files.
+  std::vector<std::byte> illumination_, importance_;
+  RunSettings settings_;
+  AnyIntegrator integrator_;
+  std::optional<Film> film_;
+  RenderResult result_;
+  OutputErrors errors_;
+  Stopwatch sinceSnapshot_;
+};
+
+void Run::prepare() {
+  if (!job_.resume.empty()) resumed_.emplace(CheckpointFile::open(job_.resume));
+  std::optional<IlluminationFile> stored;
+  if (!job_.illumination.empty()) stored.emplace(IlluminationFile::open(job_.illumination));
+  const Stopwatch reading;
+  scene_.emplace(readFor(job_));
+  load_.reading = reading.seconds();
+  checkSceneFiles(job_, *scene_);
+  log_.emplace(job_, *scene_);
+  if (job_.mayUseProduct())
+    guiding_.caches.emplace(job_.cacheFolder, lobeRequests(*scene_), lobefitCommand(job_), job_.reduction);
+  settings_ = settingsOf(job_, *scene_, guiding_, stored);
+  if (resumed_)
+    readCheckpoint();
+  else if (stored)
+    readStored(*stored);
+  const Stopwatch building;
+  renderScene_.emplace(*scene_, job_.shadowSurfaces);
+  load_.building = building.seconds();
+  load_.embree = renderScene_->tracer.buildSeconds();
+  camera_.emplace(scene_->camera, scene_->filter);
+  const Stopwatch learning;
+  renderScene_->lights.use(learnLightCells(*renderScene_, *camera_, job_.seed));
+  guiding_.secondsLights = learning.seconds();
+  if (!film_) film_.emplace(camera_->width(), camera_->height());
+  if (!job_.checkpoint.empty() && film_->pixels().size() > kMaxCheckpointPixels)
+    throw std::runtime_error(fmt::format("--checkpoint: a checkpoint holds at most {} pixels", kMaxCheckpointPixels));
+  const std::optional<Receiver> receiver = receiverFor(job_, *renderScene_, *camera_);
+  if (job_.guided()) makeGuiding();
+  if (receiver) drawRecord(job_, *renderScene_, *receiver, guiding_.training);
+  integrator_ = makeIntegrator(job_, *renderScene_, *camera_, guiding_);
+}
+
+void Run::readCheckpoint() {
+  checkSameRun(*resumed_, job_.resume, settings_);
+  const FilmCrop picture = scene_->camera.picture();
+  film_.emplace(filmOf(*resumed_));
+  if (film_->width() != picture.width || film_->height() != picture.height)
+    throw std::runtime_error(fmt::format("{}: damaged: the film has another size", job_.resume.string()));
+  result_ = resultOf(*resumed_, job_.resume);
+  const auto [least, most] = film_->sampleRange();
+  if (job_.samples && most > static_cast<std::uint32_t>(*job_.samples))
+    throw std::runtime_error(fmt::format("{}: has {} samples per pixel already, more than --spp {}",
+                                         job_.resume.string(), most, *job_.samples));
+  if (job_.guided()) readIllumination(IlluminationFile::parse(resumed_->illumination(), job_.resume), job_.resume);
+  if (!resumed_->importance().empty())
+    guiding_.training.importance =
+        restoreIllumination(IlluminationFile::parse(resumed_->importance(), job_.resume), job_.resume, *scene_).field;
+  guiding_.training.report = trainingOf(*resumed_);
+  printNote(kTool, fmt::format("{}: continues with sample {} of each pixel", job_.resume.string(), least + 1));
+}
+
+void Run::readStored(const IlluminationFile& file) {
+  readIllumination(file, job_.illumination);
+  if (job_.integrator == IntegratorKind::bdpt)
+    printNote(kTool, fmt::format("{}: holds no importance, so light paths are not guided", job_.illumination.string()));
+}
+
+void Run::readIllumination(const IlluminationFile& file, const std::filesystem::path& path) {
+  const Stopwatch restoring;
+  guiding_.training = restoreIllumination(file, path, *scene_);
+  if (job_.mayUseProduct() && job_.training.learnFractions && !guiding_.training.report.learntFractions)
+    printNote(kTool, fmt::format("{}: the records have learnt no BSDF sampling fractions (trained by guided, or with "
+                                 "--bsdf-fraction fixed); all use {:.1f}",
+                                 path.string(), kInitialBsdfFraction));
+  load_.restoring = restoring.seconds();
+}
+
+void Run::makeGuiding() {
+  const TrainingPlan plan = planOf(job_);
+  if (!resumed_ && job_.illumination.empty()) train(plan, *renderScene_, *camera_, guiding_);
+  if (!job_.checkpoint.empty() || !job_.saveIllumination.empty())
+    illumination_ = encodeIllumination(guiding_.training, plan, *scene_, job_.scene);
+  if (!job_.checkpoint.empty() && guiding_.training.importance.records() > 0)
+    importance_ =
+        encodeIllumination({guiding_.training.importance, guiding_.training.report, {}, {}}, plan, *scene_, job_.scene);
+  guiding_.reduceRecords(job_.reduction);
+  guiding_.sampler.emplace(*scene_, guiding_.training.field, guiding_.cachesOrNull());
+  guiding_.lightSampler.emplace(*scene_, guiding_.training.importance, nullptr);
+}
+
+/// Writes what a later run would have to train again otherwise. Failures do not prevent rendering.
+void Run::saveTraining() {
+  if (!job_.saveIllumination.empty())
+    errors_.attempt(job_.saveIllumination,
+                    [&] { writeAtomically(job_.saveIllumination, std::span<const std::byte>(illumination_)); });
+  for (const std::string& error : errors_.all()) printWarning(kTool, error + "; rendering goes on");
+  OutputErrors ofCheckpoint;  // it is written again later
+  writeCheckpoint(ofCheckpoint);
+  for (const std::string& error : ofCheckpoint.all()) printWarning(kTool, error);
+}
+
+RenderOptions Run::options() const {
+  RenderOptions options{job_.seed, job_.samples, std::nullopt, job_.sampling, job_.sampleOffset};
+  if (job_.seconds) options.seconds = std::max(*job_.seconds - prepared(), 1e-3);
+  if (const double every = job_.snapshotEvery.value_or(RenderJob::kSnapshotSeconds); every > 0)
+    options.longestWave = every;
+  options.stop = &stop_;
+  return options;
+}
+
+double Run::fractionDone() const {
+  return job_.samples ? static_cast<double>(result_.total.samples) / *job_.samples
+                      : (prepared() + result_.total.seconds) / *job_.seconds;
+}
+
+bool Run::snapshotIsDue() const {
+  const double every = job_.snapshotEvery.value_or(RenderJob::kSnapshotSeconds);
+  if (every == 0 || sinceSnapshot_.seconds() < every || fractionDone() >= 1) return false;
+  const double expected = (prepared() + result_.total.seconds) / fractionDone();
+  return job_.snapshotEvery || !job_.checkpoint.empty() || expected > RenderJob::kLongRun;
+}
+
+void Run::snapshot() {
+  OutputErrors errors;
+  writeOutputs(errors);
+  for (const std::string& error : errors.all()) printWarning(kTool, error);
+  sinceSnapshot_ = Stopwatch();
+}
+
+void Run::render() {
+  saveTraining();
+  Progress progress("rendering", 1);
+  double done = 0;
+  sinceSnapshot_ = Stopwatch();
+  const auto afterWave = [&](const RenderResult& result) {
+    result_ = result;
+    progress.advance(fractionDone() - done);
+    done = fractionDone();
+    log_->add(*film_, prepared() + result.total.seconds, result.total.samples);
+    if (snapshotIsDue()) snapshot();
+  };
+  result_ = std::visit(
+      [&](const auto& integrator) {
+        return lobe::render(*camera_, *integrator, *film_, options(), afterWave, result_);
+      },
+      integrator_);
+}
+
+void Run::writeOutputs(OutputErrors& errors) const {
+  const RunResult result{result_, guiding_, *film_};
+  const std::uint64_t hash = pictureHash(*scene_);
+  for (const auto& output : job_.outputs)
+    errors.attempt(output, [&] { writeImage(output, film_->mean(), attributes(job_, hash, result)); });
+  errors.attempt(job_.convergence, [&] { log_->write(); });
+  if (!job_.stats.empty())
+    errors.attempt(job_.stats, [&] { writeAtomically(job_.stats, jsonText(statistics(job_, load_, result)) + "\n"); });
+  writeCheckpoint(errors);
+}
+
+void Run::writeCheckpoint(OutputErrors& errors) const {
+  if (job_.checkpoint.empty()) return;
+  errors.attempt(job_.checkpoint, [&] {
+    const std::vector<std::byte> bytes =
+        encodeCheckpoint(settings_, *film_, result_, guiding_.training.report, illumination_, importance_);
+    writeAtomically(job_.checkpoint, std::span<const std::byte>(bytes));
+  });
+}
+
+std::string Run::stopMessage() const {
+  const auto [least, most] = film_->sampleRange();
+  std::string message = least == most ? fmt::format("{}", least) : fmt::format("{} to {}", least, most);
+  if (job_.samples) message += fmt::format(" of {}", *job_.samples);
+  message += most > 0 ? " samples per pixel are rendered and written" : " samples per pixel, so no picture is written";
+  if (!job_.checkpoint.empty()) message += fmt::format("; --resume {} goes on", shellQuoted(job_.checkpoint.string()));
+  return message;
+}
+
+void Run::finish() {
+  if (const std::uint64_t dropped = film_->dropped(); dropped > 0)
+    printWarning(kTool, fmt::format("{} samples were negative or not finite, and were discarded", dropped));
+  if (film_->sampleRange().second > 0)
+    writeOutputs(errors_);
+  else
+    writeCheckpoint(errors_);
+  if (result_.stopped && errors_.all().empty()) throw Stopped(stopMessage());
+  if (result_.stopped) printWarning(kTool, "interrupted: " + stopMessage());
+  if (!errors_.all().empty()) throw std::runtime_error(fmt::format("{}", fmt::join(errors_.all(), "\n")));
+}
+
+}  // namespace
+
+void run(const RenderJob& job, const StopFlag& stop) {
+  job.validate();
+  checkFiles(job);
+  Run run(job, stop);
+  stoppable(stop, "before the first sample, so no picture is written", [&] { run.prepare(); });
+  run.render();
+  run.finish();
+}
+
+}  // namespace lobe

@@ -1,0 +1,148 @@
+#include "runtime/tools/render_setup.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <string>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "runtime/core/stopwatch.h"
+#include "runtime/render/integrators/learn_sample_counts.h"
+#include "runtime/tools/tool.h"
+#include "scenes/scene_hash.h"
+
+namespace lobe {
+namespace {
+
+// Fraction of --seconds. In the kitchen at 60 seconds, samples have the same variance after 11 seconds of training as
+// after 21 seconds.
+constexpr double kTrainingFraction = 0.15;
+
+/// The fraction of a full-sized pilot, and of the paths for learning counts, so that both take a few percent of the
+/// time of a short run. With --spp it does not depend on the number of samples, so that parts of a picture
+/// (--sample-offset) use the same counts and the same integrator.
+double preparationSize(const RenderJob& job) {
+  constexpr double kLeast = 0.2, kSeconds = 10;
+  return job.seconds ? std::clamp(*job.seconds / kSeconds, kLeast, 1.0) : 1.0;
+}
+
+void learnCounts(const RenderJob& job, const RenderScene& scene, const RayCamera& camera, const PathOptions& options,
+                 Guiding& guiding) {
+  constexpr double kPaths = 100000;
+  const Stopwatch watch;
+  guiding.counts = learnSampleCounts(scene, camera, options, *guiding.sampler, guiding.training.field.records(),
+                                     static_cast<int>(kPaths * preparationSize(job)), job.seed);
+  guiding.secondsCounts = watch.seconds();
+}
+
+PathOptions pathOptions(const RenderJob& job, const Scene& scene) {
+  PathOptions options;
+  if (const std::optional<int> depth = job.maxDepth ? job.maxDepth : scene.maxDepth) options.maxDepth = *depth;
+  options.emitterVisibility = scene.emitterVisibility;
+  return options;
+}
+
+/// path, guided or product.
+std::unique_ptr<Integrator> makeUnidirectional(const RenderJob& job, const RenderScene& scene, const RayCamera& camera,
+                                               Guiding& guiding) {
+  PathOptions options = pathOptions(job, scene.scene);
+  auto path = std::make_unique<PathIntegrator>(scene, options);
+  if (!guiding.sampler) return path;
+  if (job.russianRoulette == RussianRoulette::efficiency) {
+    learnCounts(job, scene, camera, options, guiding);
+    options.counts = &*guiding.counts;
+  }
+  auto guided = std::make_unique<GuidedIntegrator>(scene, options, *guiding.sampler);
+  if (job.integrator != IntegratorKind::automatic) return guided;
+  const Stopwatch watch;
+  PilotOptions pilot;
+  pilot.tiles = static_cast<int>(pilot.tiles * preparationSize(job));
+  pilot.seed = job.seed;
+  // The same picture for a seed is only promised for --spp.
+  pilot.timed = job.seconds.has_value();
+  const auto results = comparePilots(camera, std::array<const Integrator*, 2>{path.get(), guided.get()}, pilot);
+  guiding.pilot = {results[0], results[1], watch.seconds()};
+  if (guiding.pilot->best() == IntegratorKind::path) return path;
+  return guided;
+}
+
+std::unique_ptr<BidirectionalIntegrator> makeBdpt(const RenderJob& job, const RenderScene& scene,
+                                                  const RayCamera& camera, const Guiding& guiding) {
+  const PathOptions options = pathOptions(job, scene.scene);
+  if (!guiding.sampler) return std::make_unique<BdptIntegrator>(scene, camera, options);
+  return std::make_unique<GuidedBdptIntegrator>(scene, camera, options, *guiding.sampler, *guiding.lightSampler);
+}
+
+std::unique_ptr<BidirectionalIntegrator> makeVcm(const RenderJob& job, const RenderScene& scene,
+                                                 const RayCamera& camera) {
+  const float diagonal = scene.tracer.bounds().isEmpty() ? 1.0f : scene.tracer.bounds().diagonal().norm();
+  const MergeRadius radius{job.merge.first * diagonal, job.merge.alpha};
+  return std::make_unique<VcmIntegrator>(scene, camera, pathOptions(job, scene.scene), radius);
+}
+
+}  // namespace
+
+TrainingPlan planOf(const RenderJob& job) {
+  TrainingPlan plan = job.training;
+  plan.seed = job.seed;
+  plan.keepParticles = job.record.has_value();
+  plan.keepImportance = job.integrator == IntegratorKind::bdpt;
+  plan.seconds = job.trainSeconds.value_or(job.seconds ? kTrainingFraction * *job.seconds : kInfinity);
+  // If the time is limited and --passes is not given, only the time limits the number of passes.
+  plan.passes = job.passes.value_or(plan.seconds < kInfinity ? std::numeric_limits<int>::max() : plan.passes);
+  return plan;
+}
+
+void train(const TrainingPlan& plan, const RenderScene& scene, const RayCamera& camera, Guiding& guiding) {
+  const bool timed = plan.seconds < kInfinity;
+  Progress progress("training", timed ? plan.seconds : plan.passes);
+  guiding.training = trainIllumination(scene, camera, guiding.cachesOrNull(), plan,
+                                       [&](const PassReport& pass) { progress.advance(timed ? pass.seconds : 1.0); });
+}
+
+RunSettings settingsOf(const RenderJob& job, const Scene& scene, const Guiding& guiding,
+                       const std::optional<IlluminationFile>& stored) {
+  const FilmCrop picture = scene.camera.picture();
+  RunSettings all{{"the version of Lobe", LOBE_VERSION},
+                  {"--integrator", nameOf(job.integrator)},
+                  {"the size", fmt::format("{}x{}", picture.width, picture.height)},
+                  {"--seed", std::to_string(job.seed)},
+                  {"--sampler", job.sampling == PixelSampling::sobol ? "sobol" : "independent"},
+                  {"--sample-offset", std::to_string(job.sampleOffset)},
+                  {"--max-depth", job.maxDepth ? std::to_string(*job.maxDepth) : "that of the scene"},
+                  {"--shadow-surfaces", std::to_string(job.shadowSurfaces)},
+                  {"the hash of scene and camera", fmt::format("{:016x}", pictureHash(scene))}};
+  if (job.integrator == IntegratorKind::bdpt) all.emplace_back("--guide", nameOf(job.guide));
+  if (job.integrator == IntegratorKind::vcm) {
+    all.emplace_back("--merge-radius", fmt::format("{}", job.merge.first));
+    all.emplace_back("--merge-alpha", fmt::format("{}", job.merge.alpha));
+  }
+  if (!job.guided()) return all;
+  const TrainingPlan& plan = job.training;
+  const auto names = trainFromNames();
+  const auto from = std::ranges::find(names, plan.from, [](const auto& entry) { return entry.second; });
+  all.emplace_back("--reduction", fmt::format("{}", job.reduction));
+  all.emplace_back("--russian-roulette",
+                   job.russianRoulette == RussianRoulette::efficiency ? "efficiency" : "throughput");
+  all.emplace_back("the hash of --illumination", stored ? fmt::format("{:016x}", stored->header().hash) : "none");
+  all.emplace_back("--train", from->first);
+  all.emplace_back("--passes", job.passes ? std::to_string(*job.passes) : "the default");
+  all.emplace_back("--photons", std::to_string(plan.photons));
+  all.emplace_back("--importons", std::to_string(plan.importons));
+  all.emplace_back("--components", std::to_string(plan.records.components));
+  all.emplace_back("--bsdf-fraction", plan.learnFractions ? "learnt" : "fixed");
+  if (guiding.caches)
+    all.emplace_back("the hash of the BRDF caches", fmt::format("{:016x}", fmt::join(guiding.caches->hashes(), " ")));
+  return all;
+}
+
+AnyIntegrator makeIntegrator(const RenderJob& job, const RenderScene& scene, const RayCamera& camera,
+                             Guiding& guiding) {
+  if (job.integrator == IntegratorKind::bdpt) return makeBdpt(job, scene, camera, guiding);
+  if (job.integrator == IntegratorKind::vcm) return makeVcm(job, scene, camera);
+  return makeUnidirectional(job, scene, camera, guiding);
+}
+
+}  // namespace lobe
