@@ -1,0 +1,89 @@
+#!/usr/bin/python3
+"""Opens a page of scripts/report in headless Chromium: the slider moves, the crop follows the keyboard, error maps appear, the page fits
+the width of a phone, and there is no script error.
+
+The argument is the folder of the tools. Exits with 77 if Chromium or Selenium is not installed.
+"""
+
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+SKIPPED = 77
+
+try:
+    from selenium import webdriver
+    from selenium.webdriver.chrome.options import Options
+    from selenium.webdriver.chrome.service import Service
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.common.keys import Keys
+except ImportError:
+    print("skipped: Selenium is not installed (python3-selenium)")
+    sys.exit(SKIPPED)
+
+
+def make_page(tools, folder):
+    out = folder / "evaluation"
+    evaluate = [ROOT / "scripts/evaluate", out, "--scenes", "jewelry", "--methods", "path", "--method",
+                "depth-2=--integrator path --max-depth 2", "--spp", "1", "2", "--build", f"a={tools}"]
+    subprocess.run(evaluate, check=True)
+    before = {path: path.stat().st_mtime_ns for path in (out / "runs").rglob("*.exr")}
+    subprocess.run(evaluate, check=True)
+    assert before == {path: path.stat().st_mtime_ns for path in (out / "runs").rglob("*.exr")}, "complete runs are repeated"
+    subprocess.run([ROOT / "scripts/report", out, "--tools", tools], check=True)
+    return out / "report.html"
+
+
+def open_page(page):
+    options = Options()
+    options.binary_location = shutil.which("chromium")
+    for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1300,1600"):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
+    driver.get(page.as_uri())
+    return driver
+
+
+def check(driver):
+    scene = driver.find_element(By.ID, "jewelry")
+    right = scene.find_element(By.CSS_SELECTOR, "img.right")
+    assert driver.execute_script("return arguments[0].naturalWidth", right) == 240, "the picture is not shown"
+    bar = scene.find_element(By.CSS_SELECTOR, "input[type=range]")
+    for _ in range(10):
+        bar.send_keys(Keys.ARROW_RIGHT)
+    assert "60%" in right.value_of_css_property("clip-path"), "the slider does not move"
+    window = scene.find_element(By.CSS_SELECTOR, ".window")
+    before = window.value_of_css_property("left")
+    scene.find_element(By.CSS_SELECTOR, ".slider").send_keys(Keys.ARROW_RIGHT)
+    assert window.value_of_css_property("left") != before, "the crop does not move"
+    picture = right.get_attribute("src")
+    scene.find_element(By.CSS_SELECTOR, "input[type=checkbox]").send_keys(Keys.SPACE)
+    assert right.get_attribute("src") != picture, "there is no error map"
+    assert len(scene.find_elements(By.CSS_SELECTOR, ".crops figure")) == 2
+    assert len(scene.find_elements(By.CSS_SELECTOR, "svg circle")) == 4, "the chart does not have a point for each budget"
+    driver.set_window_size(500, 1600)  # the narrowest window of Chromium
+    assert driver.execute_script("return document.documentElement.scrollWidth <= innerWidth"), "too wide for a phone"
+    errors = driver.get_log("browser")
+    assert not errors, errors
+
+
+def main():
+    if not (shutil.which("chromium") and shutil.which("chromedriver")):
+        print("skipped: Chromium is not installed (chromium, chromium-driver)")
+        return SKIPPED
+    with tempfile.TemporaryDirectory() as folder:
+        driver = open_page(make_page(pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(folder)))
+        try:
+            check(driver)
+        finally:
+            driver.quit()
+    print("the page works")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
