@@ -23,7 +23,8 @@ Film::Pixel loaded(const StoredPixel& p) {
 /// All counters of the statistics, in a fixed order.
 template <class Statistics>
 auto countersOf(Statistics& statistics) {
-  std::vector<decltype(&statistics.paths)> all{&statistics.paths, &statistics.segments, &statistics.shadowRays};
+  std::vector<decltype(&statistics.paths)> all{&statistics.paths, &statistics.segments, &statistics.shadowRays,
+                                               &statistics.refits};
   for (auto& count : statistics.strategies) all.push_back(&count);
   for (auto& count : statistics.decisions) all.push_back(&count);
   return all;

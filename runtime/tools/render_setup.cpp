@@ -54,6 +54,7 @@ std::unique_ptr<Integrator> makeUnidirectional(const RenderJob& job, const Rende
     learnCounts(job, scene, camera, options, guiding);
     options.counts = &*guiding.counts;
   }
+  if (guiding.rendered) options.rendered = &*guiding.rendered;
   auto guided = std::make_unique<GuidedIntegrator>(scene, options, *guiding.sampler);
   if (job.integrator != IntegratorKind::automatic) return guided;
   const Stopwatch watch;
@@ -88,6 +89,7 @@ TrainingPlan planOf(const RenderJob& job) {
   TrainingPlan plan = job.training;
   plan.seed = job.seed;
   plan.keepParticles = job.record.has_value();
+  plan.keepTraining = job.learnsWhileRendering();
   plan.keepImportance = job.integrator == IntegratorKind::bdpt;
   plan.seconds = job.trainSeconds.value_or(job.seconds ? kTrainingFraction * *job.seconds : kInfinity);
   // If the time is limited and --passes is not given, only the time limits the number of passes.

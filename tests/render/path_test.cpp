@@ -367,6 +367,126 @@ bool sameFilm(const Film& a, const Film& b) {
 
 }  // namespace
 
+namespace {
+
+// Samples uniform directions; all vertices belong to record 0.
+struct RecordedSampler {
+  UniformSampler right;
+  mutable std::atomic<int> continued = 0;
+  class Vertex : public UniformSampler::Vertex {
+   public:
+    Vertex(const RecordedSampler& sampler, const SurfaceHit& hit)
+        : UniformSampler::Vertex(sampler.right, hit), sampler_(sampler), side_(std::copysign(1.0f, hit.wo.z())) {}
+    std::optional<RecordDirection> inRecord(const Vec3& wi) const {
+      ++sampler_.continued;
+      return RecordDirection{0, {wi.x(), wi.y(), side_ * wi.z()}};
+    }
+
+   private:
+    const RecordedSampler& sampler_;
+    float side_;
+  };
+};
+
+// Of each path, the mean of Σw over the directions in which it continued.
+double meanIncident(const RenderScene& scene, const Ray& ray, PathOptions options) {
+  constexpr int kPaths = 20000;
+  RenderedSamples samples(1, 1000000);
+  options.rendered = &samples;
+  const RecordedSampler sampler;
+  const PathLoop loop(scene, options, sampler);
+  PathStatistics statistics;
+  for (int i = 0; i < kPaths; ++i) {
+    Sampler rng(4, 0, i);
+    loop.radiance(ray, rng, statistics);
+  }
+  double sum = 0;
+  for (const WeightedPoint& p : samples.points(0)) sum += p.weight;
+  CHECK(samples.points(0).size() > kPaths / 2);
+  return sum / sampler.continued;
+}
+
+}  // namespace
+
+TEST_CASE("render: paths record the irradiance that next-event estimation does not cover") {
+  // In a diffuse sphere with a point light at its centre, every point of the wall receives the irradiance E from the
+  // light, which only next-event estimation finds, and ρE/(1−ρ) from the wall.
+  Scene scene;
+  addShape(scene, Sphere{{0, 0, 0}, 2}, addMaterial(scene, std::make_shared<Diffuse>(kAlbedo)));
+  scene.lights.push_back(PointLight{{0, 0, 0}, grey(6)});
+  const RenderScene ready(scene);
+  const Ray ray{Vec3(0.5f, 0.3f, 0), Vec3(0, 0, 1)};
+  const double expected = 6.0 / 4 * kAlbedo / (1 - kAlbedo);
+  CHECK(meanIncident(ready, ray, {}) == Approx(expected).epsilon(0.02));
+  PathLog log;
+  for (int i = 0; i < 10; ++i) {
+    log.vertices.push_back({{1, 0}, 1, 0, 0, 0, 1});
+    log.vertices.push_back({{1, 1}, 1, 0, 0, 0, 1});
+    log.paths.push_back({log.vertices.size(), i == 0 ? 8.0f : 0.0f, 2});
+  }
+  const SampleCountModel counts(log, 2);
+  PathOptions splitting;
+  splitting.counts = &counts;
+  CHECK(meanIncident(ready, ray, splitting) == Approx(expected).epsilon(0.02));
+}
+
+TEST_CASE("render: direct light is next-event estimation and the recorded irradiance") {
+  Scene scene = floorScene();
+  addEmitter(scene, rectangle({-1, 1, -2}, {2, 0, 0}, {0, 0, 4}), 3);
+  const RenderScene ready(scene);
+  RenderedSamples samples(1, 1000000);
+  PathOptions options{2};
+  options.rendered = &samples;
+  const RecordedSampler sampler;
+  const PathLoop loop(ready, options, sampler);
+  PathLog log;
+  constexpr int kPaths = 40000;
+  // The logged part only counts vertices with an estimate, and the origin has one in every path or in none.
+  const Ray ray{Vec3(0.5f, 0.5f, 0.013f), Vec3(-1, -1, 0).normalized()};
+  for (int i = 0; i < kPaths; ++i) {
+    Sampler rng(5, 0, i);
+    loop.log(ray, rng, log);
+  }
+  REQUIRE(log.vertices.size() == kPaths);
+  double direct = 0, irradiance = 0;
+  for (const PathLog::Vertex& vertex : log.vertices) direct += vertex.radianceDirect / kPaths;
+  for (const WeightedPoint& p : samples.points(0)) irradiance += p.weight / kPaths;
+  const double whole = kAlbedo * 3 * 4 * cornerFactor(1, 2);
+  CHECK(direct < 0.95 * whole);
+  CHECK(direct + irradiance * kAlbedo * kInvPi == Approx(whole).epsilon(0.01));
+  samples.setOpen(false);
+  const std::size_t before = samples.points(0).size();
+  Sampler rng(5, 0, 0);
+  loop.log(ray, rng, log);
+  CHECK(samples.points(0).size() == before);
+}
+
+TEST_CASE("render: the samples after a change of the guiding are independent of those before") {
+  const Scene scene = roomScene();
+  const RenderScene ready(scene);
+  Camera camera;
+  camera.width = 20, camera.height = 10;
+  camera.toWorld.topRightCorner<3, 1>() = Vec3(0, 1.5f, -1.9f);
+  const RayCamera pinhole(camera, {});
+  const PathIntegrator integrator(ready, {});
+  const auto rendered = [&](const std::function<bool(const RenderProgress&)>& learn, std::uint64_t refits) {
+    Film film(camera.width, camera.height);
+    RenderOptions options;
+    options.samples = 8;
+    options.learn = learn;
+    const RenderResult result = render(pinhole, integrator, film, options);
+    CHECK(result.total.samples == 8);
+    CHECK(result.statistics.refits == refits);
+    return film;
+  };
+  const Film plain = rendered({}, 0);
+  CHECK(sameFilm(plain, rendered([](const RenderProgress&) { return false; }, 0)));
+  CHECK(sameFilm(plain, rendered([](const RenderProgress& p) { return p.samples == 8; }, 1)));
+  const Film changed = rendered([](const RenderProgress& p) { return p.samples == 4; }, 1);
+  CHECK_FALSE(sameFilm(plain, changed));
+  CHECK(sameFilm(changed, rendered([](const RenderProgress& p) { return p.samples == 4; }, 1)));
+}
+
 TEST_CASE("render: stopped at any moment and continued, an image has the same bytes") {
   const Scene scene = roomScene();
   const RenderScene ready(scene);

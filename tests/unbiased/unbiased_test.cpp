@@ -205,3 +205,58 @@ TEST_CASE("unbiased: training and rendering do not depend on the number of threa
   const Image one = renderWith(1), two = renderWith(2);
   for (std::size_t i = 0; i < one.pixels.size(); ++i) REQUIRE((one.pixels[i] == two.pixels[i]).all());
 }
+
+namespace {
+
+/// A picture of the product integrator whose records are fitted to its samples after 2, 4, 8, ... samples per pixel.
+Film renderLearning(const Studio& studio, int samples, std::uint64_t seed) {
+  TrainingPlan plan;
+  plan.passes = 2;
+  plan.photons = 2000;
+  plan.importons = 1000;
+  plan.seed = 5;
+  plan.keepTraining = true;
+  Field field = trainIllumination(studio.renderScene(), studio.camera(), &studio.caches(), plan).field;
+  REQUIRE(field.records() > 10);
+  const std::vector<IlluminationRecord> trained = cacheOf(field).records();
+  const GuidedSampler sampler(studio.scene(), field, &studio.caches());
+  RenderedSamples rendered(field.records(), 100);
+  PathOptions paths;
+  paths.rendered = &rendered;
+  Film film(studio.camera().width(), studio.camera().height());
+  RenderOptions options;
+  options.seed = seed;
+  options.samples = samples;
+  options.learn = [&](const RenderProgress& progress) {
+    if (progress.samples < 2 || (progress.samples & (progress.samples - 1)) != 0) return false;
+    refitWith(field, rendered);
+    return true;
+  };
+  render(studio.camera(), GuidedIntegrator(studio.renderScene(), paths, sampler), film, options);
+  const std::vector<IlluminationRecord> learnt = cacheOf(field).records();
+  int changed = 0;
+  for (std::size_t i = 0; i < learnt.size(); ++i) changed += learnt[i].background != trained[i].background;
+  CHECK(changed > static_cast<int>(learnt.size()) / 2);
+  return film;
+}
+
+}  // namespace
+
+TEST_CASE("unbiased: a picture whose records learn from its own samples is that of path tracing", "[slow]") {
+  const Studio studio(readScene(std::string(LOBE_SOURCE_DIR) + "/scenes/jewelry.xml"), 30, 20);
+  const auto path = blocks(studio.render(studio.path(), 1024, 1), 5);
+  CHECK(agree(path, blocks(renderLearning(studio, 256, 2), 5)));
+}
+
+TEST_CASE("unbiased: learning from the samples of the picture does not depend on the number of threads") {
+  const Studio studio(readScene(std::string(LOBE_SOURCE_DIR) + "/scenes/jewelry.xml"), 30, 20);
+  std::vector<Image> images;
+  for (const std::size_t threads : {1, 2, 7}) {
+    const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism, threads);
+    images.push_back(renderLearning(studio, 12, 3).mean());
+  }
+  for (std::size_t i = 0; i < images[0].pixels.size(); ++i) {
+    REQUIRE((images[0].pixels[i] == images[1].pixels[i]).all());
+    REQUIRE((images[0].pixels[i] == images[2].pixels[i]).all());
+  }
+}

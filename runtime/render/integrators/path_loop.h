@@ -16,6 +16,9 @@
 //       float pdf(const Vec3& wi) const;
 //       // Decides on the counts of samples, see sample_counts.h; nullopt: unknown.
 //       std::optional<VertexEstimate> estimate() const;
+//       // Only for guides that learn from PathOptions::rendered: the direction in the frame of the record that serves
+//       // the vertex; nullopt if there is none, or if the direction is below its horizon.
+//       std::optional<RecordDirection> inRecord(const Vec3& wi) const;
 //     };
 //   };
 //
@@ -26,7 +29,9 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <vector>
 
+#include "runtime/guiding/rendered_samples.h"
 #include "runtime/render/integrators/integrator.h"
 #include "runtime/render/integrators/sample_counts.h"
 #include "runtime/render/lights/render_scene.h"
@@ -40,6 +45,8 @@ struct PathOptions {
   /// the pixel are stratified, and more of them are worth more than splitting. Null, and without an estimate: Russian
   /// roulette by throughput.
   const SampleCountModel* counts = nullptr;
+  /// Where paths add the incident radiance that they find, as long as it is open. Null: nowhere.
+  RenderedSamples* rendered = nullptr;
   EmitterVisibility emitterVisibility = EmitterVisibility::shown;
 };
 
@@ -49,6 +56,12 @@ inline constexpr float kMaxSurvival = 0.95f;
 /// Upper bound of the branches that splitting makes of one camera path.
 inline constexpr float kMaxBranches = 16;
 
+/// A direction in the frame of the mixture of an illumination record.
+struct RecordDirection {
+  std::uint32_t record;  ///< index of the record
+  Vec3 direction;        ///< unit, z > 0
+};
+
 template <class Guide>
 class PathLoop {
  public:
@@ -56,22 +69,37 @@ class PathLoop {
       : scene_(scene), options_(options), sampler_(sampler) {}
 
   Rgb radiance(const Ray& cameraRay, Sampler& rng, PathStatistics& statistics) const {
+    Found found;
     Path path{cameraRay, &rng, &statistics};
+    if (options_.rendered && options_.rendered->open()) path.found = &found;
     ++statistics.paths;
     follow(path);
+    addFound(path, 0);
     return path.radiance;
   }
 
   /// Traces a path without counts, and appends it to the log.
   void log(const Ray& cameraRay, Sampler& rng, PathLog& log) const {
     PathStatistics statistics;
+    Found found;
     Path path{cameraRay, &rng, &statistics};
     path.log = &log;
+    if (options_.rendered && options_.rendered->open()) path.found = &found;
     follow(path);
+    addFound(path, 0);
     log.paths.push_back({log.vertices.size(), luminance(path.radiance), static_cast<float>(statistics.cost())});
   }
 
  private:
+  // A direction in which a path has continued. What the rest of the path finds is incident radiance from there.
+  struct Continuation {
+    RecordDirection at;
+    float cosineOverPdf;
+    Rgb throughput;      // of the path that continues
+    Rgb radianceBefore;  // found by the path before it continued
+  };
+  using Found = std::vector<Continuation>;  // of a path and those that it has branched off from, in order
+
   struct Path {
     Ray ray;
     Sampler* rng;
@@ -85,6 +113,7 @@ class PathLoop {
     float reference = 0;  // SampleCountModel::reference; 0: no vertex had an estimate yet
     float branches = 1;   // expected number into which the camera path has been split so far
     PathLog* log = nullptr;
+    Found* found = nullptr;  // null: not wanted
   };
 
   void follow(Path& path) const {
@@ -199,7 +228,9 @@ class PathLoop {
       Path branch = path;
       branch.rng = &rng;
       branch.radiance = Rgb::Zero();
+      const std::size_t first = path.found ? path.found->size() : 0;
       if (scatterAt(branch, at)) follow(branch);
+      addFound(branch, first);
       path.radiance += branch.radiance;
     }
     return scatterAt(path, at);
@@ -249,7 +280,25 @@ class PathLoop {
     path.eta2 *= sample->eta * sample->eta;
     if (!continueAlong(path, hit, sample->wi, sample->f * (std::abs(sample->wi.z()) / pdf))) return false;
     path.emissionWeight.scattered(at.lights, path.ray.direction, pdf);
+    if constexpr (requires { at.vertex.inRecord(sample->wi); })
+      if (path.found)
+        if (const std::optional<RecordDirection> in = at.vertex.inRecord(sample->wi))
+          path.found->push_back({*in, in->direction.z() / pdf, path.throughput, path.radiance});
     return true;
+  }
+
+  // Adds the incident radiance of the continuations from the given index on, which are those of this path, and removes
+  // them. Emission that they have found is weighted against next-event estimation, whose part is left out.
+  void addFound(const Path& path, std::size_t first) const {
+    if (!path.found) return;
+    for (std::size_t i = first; i < path.found->size(); ++i) {
+      const Continuation& c = (*path.found)[i];
+      const Rgb light = path.radiance - c.radianceBefore;
+      const float incident = luminance((c.throughput > 0).select(light / c.throughput, Rgb::Zero()));
+      if (incident > 0)
+        options_.rendered->add(c.at.record, toDisc(c.at.direction), incident * c.cosineOverPdf, path.rng->uniform());
+    }
+    path.found->resize(first);
   }
 
   bool scatterDelta(Path& path, const SurfaceHit& hit, float fraction) const {

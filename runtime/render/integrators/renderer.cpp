@@ -15,6 +15,7 @@ namespace {
 
 constexpr int kTileSize = 16;
 constexpr std::uint64_t kLightSeed = 0x6c69676874;  // keeps the random numbers of light paths apart
+constexpr std::uint64_t kRefitSeed = 0x7265666974526566;
 
 /// A part of the samples of all pixels.
 struct Wave {
@@ -25,12 +26,16 @@ struct Wave {
 /// The pixels of an image in tiles, with the random numbers of their samples.
 class Tiles {
  public:
-  Tiles(const RayCamera& camera, const RenderOptions& options) : camera_(camera), options_(options) {
+  Tiles(const RayCamera& camera, const RenderOptions& options)
+      : camera_(camera), options_(options), seed_(options.seed) {
     columns_ = (camera.width() + kTileSize - 1) / kTileSize;
     count_ = columns_ * ((camera.height() + kTileSize - 1) / kTileSize);
   }
 
   int count() const { return count_; }
+
+  /// Makes the samples from now on independent of those with another number of refits (PathStatistics::refits).
+  void setRefits(std::uint64_t refits) { seed_ = options_.seed + kRefitSeed * refits; }
 
   /// Calls renderPixel(x, y, tile, statistics) for all pixels, in parallel by tiles. Leaves out the tiles that have not
   /// begun when skip() returns true.
@@ -51,8 +56,8 @@ class Tiles {
 
   /// For sample s, counted from RenderOptions::firstSample.
   Sampler sampler(int x, int y, int s) const {
-    return options_.sampling == PixelSampling::sobol ? Sampler::stratified(options_.seed, pixelOf(x, y), indexOf(s))
-                                                     : Sampler(options_.seed, pixelOf(x, y), indexOf(s));
+    return options_.sampling == PixelSampling::sobol ? Sampler::stratified(seed_, pixelOf(x, y), indexOf(s))
+                                                     : Sampler(seed_, pixelOf(x, y), indexOf(s));
   }
   /// Independent numbers for the light path of the same sample.
   Sampler lightSampler(int x, int y, int s) const {
@@ -74,6 +79,7 @@ class Tiles {
 
   const RayCamera& camera_;
   const RenderOptions& options_;
+  std::uint64_t seed_;  // of camera paths
   int columns_, count_;
 };
 
@@ -86,8 +92,9 @@ class WaveRenderer {
   WaveRenderer(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options)
       : camera_(camera), integrator_(integrator), film_(film), stop_(options.stop), tiles_(camera, options) {}
 
-  /// Adds to every pixel the samples that it lacks to have `samples` of them.
-  Wave render(int samples) {
+  /// Adds to every pixel the samples that it lacks to have `samples` of them. refits: see Tiles::setRefits.
+  Wave render(int samples, std::uint64_t refits) {
+    tiles_.setRefits(refits);
     return tiles_.render(
         [&] { return isSet(stop_); },
         [&](int x, int y, int, PathStatistics& statistics) { renderPixel(x, y, samples, statistics); });
@@ -123,7 +130,7 @@ class BidirectionalRenderer {
         splats_(tiles_.count()) {}
 
   /// Adds samples until every pixel has `samples` of them.
-  Wave render(int samples) {
+  Wave render(int samples, std::uint64_t) {
     Wave wave;
     for (int s = static_cast<int>(film_.sampleRange().first); s < samples; ++s) {
       wave.complete = !isSet(stop_);
@@ -229,12 +236,15 @@ RenderResult renderWaves(Renderer renderer, const Film& film, const RenderOption
   result.stopped = false;
   while (const int samples = plan.next(progress)) {
     const Stopwatch watch;
-    const Wave wave = renderer.render(progress.samples + samples);
+    const Wave wave = renderer.render(progress.samples + samples, result.statistics.refits);
+    const double secondsBefore = progress.seconds;
     result.statistics += wave.statistics;
-    progress.seconds += watch.seconds();
+    progress.seconds = secondsBefore + watch.seconds();
     progress.samples = static_cast<int>(film.sampleRange().first);
     result.stopped = !wave.complete;
     if (result.stopped) break;
+    if (options.learn && options.learn(progress)) ++result.statistics.refits;
+    progress.seconds = secondsBefore + watch.seconds();
     if (afterWave) afterWave(result);
   }
   return result;
