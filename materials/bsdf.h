@@ -31,8 +31,12 @@ struct BsdfSample {
 
 struct DeltaSample {
   Vec3 wi;
-  Rgb weight;  ///< f·|cosθ| divided by the probability of choosing wi within the delta part
-  float eta;   ///< relative index of refraction as in BsdfSample; 1 for reflection and pass-through
+  Rgb weight;                ///< f·|cosθ| divided by the probability of choosing wi within the delta part
+  float eta;                 ///< relative index of refraction as in BsdfSample; 1 for reflection and pass-through
+  float probability = 1.0f;  ///< of choosing this component within the delta part
+  /// Which component of the delta part this is: a number in [0,1) that is the same at all points of the material and
+  /// does not decrease with `choice`.
+  double component = 0.0;
 };
 
 /// The part of a delta component that passes to the other side of a surface in one direction.

@@ -75,7 +75,8 @@ std::optional<DeltaSample> CoatedBase::sampleDelta(const Vec3& wo, const Vec2& u
   const std::optional<DeltaSample> inside = nested_->sampleDelta(*o, uv, choice);
   const std::optional<Vec3> wi = inside ? bentOutwards(inside->wi) : std::nullopt;
   if (!wi) return std::nullopt;
-  return DeltaSample{*wi, inside->weight * absorption(*o, inside->wi, uv), inside->eta};
+  return DeltaSample{*wi, inside->weight * absorption(*o, inside->wi, uv), inside->eta, inside->probability,
+                     inside->component};
 }
 
 // The probability of the nested sampler's delta part approximates the fraction of the delta part in the albedo.

@@ -34,10 +34,12 @@ class Coating final : public CoatedBsdf {
     const float nested = luminance(nestedAlbedo(wo, uv).delta);
     if (!(specular + nested > 0.0f) || wo.z() == 0.0f) return std::nullopt;
     const float p = specular / (specular + nested);
-    if (choice < p) return DeltaSample{Vec3(-wo.x(), -wo.y(), wo.z()), mirrored / p, 1.0f};
+    if (choice < p) return DeltaSample{Vec3(-wo.x(), -wo.y(), wo.z()), mirrored / p, 1.0f, p};
     std::optional<DeltaSample> result = base().sampleDelta(wo, uv, (choice - p) / (1.0f - p));
-    if (result)
-      result->weight *= transmittance(std::abs(wo.z())) * transmittance(std::abs(result->wi.z())) / (1.0f - p);
+    if (!result) return std::nullopt;
+    result->weight *= transmittance(std::abs(wo.z())) * transmittance(std::abs(result->wi.z())) / (1.0f - p);
+    result->probability *= 1.0f - p;
+    result->component = 0.5 * (1.0 + result->component);
     return result;
   }
 

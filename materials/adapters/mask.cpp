@@ -28,9 +28,12 @@ class Mask final : public Bsdf {
     const float total = p.pass + p.nestedDelta;
     if (!(total > 0.0f)) return std::nullopt;
     const float pass = p.pass / total;
-    if (choice < pass) return DeltaSample{-wo, (1.0f - a) / pass, 1.0f};
+    if (choice < pass) return DeltaSample{-wo, (1.0f - a) / pass, 1.0f, pass};
     std::optional<DeltaSample> result = nested_->sampleDelta(wo, uv, (choice - pass) / (1.0f - pass));
-    if (result) result->weight *= a / (1.0f - pass);
+    if (!result) return std::nullopt;
+    result->weight *= a / (1.0f - pass);
+    result->probability *= 1.0f - pass;
+    result->component = 0.5 * (1.0 + result->component);
     return result;
   }
 

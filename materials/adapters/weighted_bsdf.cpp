@@ -98,7 +98,10 @@ std::optional<DeltaSample> WeightedBsdf::sampleDelta(const Vec3& wo, const Vec2&
   const std::optional<Pick> picked = pick(split(wo, uv).delta, choice);
   if (!picked) return std::nullopt;
   std::optional<DeltaSample> result = parts_[picked->part]->sampleDelta(wo, uv, picked->choice);
-  if (result) result->weight *= weights(uv)[picked->part] / picked->fraction;
+  if (!result) return std::nullopt;
+  result->weight *= weights(uv)[picked->part] / picked->fraction;
+  result->probability *= picked->fraction;
+  result->component = (static_cast<double>(picked->part) + result->component) / static_cast<double>(parts_.size());
   return result;
 }
 

@@ -27,10 +27,10 @@ class Dielectric final : public Bsdf {
     const float total = luminance(reflected) + luminance(refracted);
     if (!(total > 0.0f) || wo.z() == 0.0f) return std::nullopt;
     const float p = luminance(reflected) / total;
-    if (choice < p) return DeltaSample{Vec3(-wo.x(), -wo.y(), wo.z()), reflected / p, 1.0f};
+    if (choice < p) return DeltaSample{Vec3(-wo.x(), -wo.y(), wo.z()), reflected / p, 1.0f, p};
     const float e = static_cast<float>(eta);
     // Refraction compresses solid angles in the denser medium, so that L/n² is conserved and not L.
-    return DeltaSample{refractedDirection(wo, fresnel, e), refracted / ((1.0f - p) * e * e), e};
+    return DeltaSample{refractedDirection(wo, fresnel, e), refracted / ((1.0f - p) * e * e), e, 1.0f - p, 0.5};
   }
   std::optional<DeltaTransmission> deltaTransmission(const Vec3& wo, const Vec2& uv) const override {
     const double eta = wo.z() > 0.0f ? eta_ : 1.0 / eta_;

@@ -27,8 +27,8 @@ class ThinDielectric final : public Bsdf {
     const float total = luminance(reflected) + luminance(passed);
     if (!(total > 0.0f) || wo.z() == 0.0f) return std::nullopt;
     const float p = luminance(reflected) / total;
-    if (choice < p) return DeltaSample{Vec3(-wo.x(), -wo.y(), wo.z()), reflected / p, 1.0f};
-    return DeltaSample{-wo, passed / (1.0f - p), 1.0f};
+    if (choice < p) return DeltaSample{Vec3(-wo.x(), -wo.y(), wo.z()), reflected / p, 1.0f, p};
+    return DeltaSample{-wo, passed / (1.0f - p), 1.0f, 1.0f - p, 0.5};
   }
   std::optional<DeltaTransmission> deltaTransmission(const Vec3& wo, const Vec2& uv) const override {
     return DeltaTransmission{-wo, (1.0f - slabReflectance(wo)) * transmittance_->eval(uv), true};

@@ -141,10 +141,9 @@ Ray RayCamera::rayThrough(const Vec2& point, const Vec2& lens) const {
   return clipped(position_ + offset, (film - offset / focus_).normalized());
 }
 
-Ray RayCamera::sample(int x, int y, Sampler& rng) const {
-  const Vec2 point = Vec2(x + 0.5f, y + 0.5f) + filter_.sample(rng.stratified2());
-  if (kind_ != Camera::Kind::thinlens) return rayThrough(point);
-  return rayThrough(point, squareToDisk(rng.stratified2()));
+CameraSample RayCamera::sample(Sampler& rng) const {
+  const Vec2 offset = filter_.sample(rng.stratified2());
+  return {offset, hasLens() ? squareToDisk(rng.stratified2()) : Vec2(Vec2::Zero())};
 }
 
 float RayCamera::density(const Ray& ray, float distance) const {

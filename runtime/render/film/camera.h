@@ -39,6 +39,13 @@ struct CameraView {
   float density;  ///< RayCamera::density of the ray at the point
 };
 
+/// Where a camera ray passes: an offset from the centre of a pixel, in pixels, and a point of the lens in the unit
+/// disc.
+struct CameraSample {
+  Vec2 offset;
+  Vec2 lens;
+};
+
 /// Generates the rays of a perspective (pinhole or thin lens) or orthographic camera.
 class RayCamera {
  public:
@@ -54,7 +61,12 @@ class RayCamera {
   Ray rayThrough(const Vec2& point, const Vec2& lens = Vec2::Zero()) const;
 
   /// A random ray for the pixel in column x and row y, from a random point on the lens.
-  Ray sample(int x, int y, Sampler& rng) const;
+  Ray sample(int x, int y, Sampler& rng) const { return rayThrough(x, y, sample(rng)); }
+  /// The random numbers of `sample`, and the ray for a pixel with such numbers.
+  CameraSample sample(Sampler& rng) const;
+  Ray rayThrough(int x, int y, const CameraSample& sample) const {
+    return rayThrough(Vec2(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f) + sample.offset, sample.lens);
+  }
 
   /// The density over area, perpendicular to the ray, of the rays through one point of the lens at a distance from the
   /// ray's origin, if there is one ray per pixel area of the image (the importance of the camera, Veach 1997, Section

@@ -89,8 +89,8 @@ bool isSet(const StopFlag* stop) {
 
 class WaveRenderer {
  public:
-  WaveRenderer(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options)
-      : camera_(camera), integrator_(integrator), film_(film), stop_(options.stop), tiles_(camera, options) {}
+  WaveRenderer(const RayCamera& camera, const AddSample& addSample, const Film& film, const RenderOptions& options)
+      : addSample_(addSample), film_(film), stop_(options.stop), tiles_(camera, options) {}
 
   /// Adds to every pixel the samples that it lacks to have `samples` of them. refits: see Tiles::setRefits.
   Wave render(int samples, std::uint64_t refits) {
@@ -104,14 +104,12 @@ class WaveRenderer {
   void renderPixel(int x, int y, int samples, PathStatistics& statistics) const {
     for (int s = static_cast<int>(film_.pixel(x, y).samples()); s < samples; ++s) {
       Sampler rng = tiles_.sampler(x, y, s);
-      const Ray ray = camera_.sample(x, y, rng);
-      film_.add(x, y, integrator_.radiance(ray, rng, statistics));
+      addSample_(x, y, rng, statistics);
     }
   }
 
-  const RayCamera& camera_;
-  const Integrator& integrator_;
-  Film& film_;
+  const AddSample& addSample_;
+  const Film& film_;
   const StopFlag* stop_;
   Tiles tiles_;
 };
@@ -254,8 +252,17 @@ RenderResult renderWaves(Renderer renderer, const Film& film, const RenderOption
 
 RenderResult render(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options,
                     const AfterWave& afterWave, const RenderResult& before) {
+  const AddSample addSample = [&](int x, int y, Sampler& rng, PathStatistics& statistics) {
+    const Ray ray = camera.sample(x, y, rng);
+    film.add(x, y, integrator.radiance(ray, rng, statistics));
+  };
+  return render(camera, addSample, film, options, afterWave, before);
+}
+
+RenderResult render(const RayCamera& camera, const AddSample& addSample, const Film& film, const RenderOptions& options,
+                    const AfterWave& afterWave, const RenderResult& before) {
   options.validate();
-  return renderWaves(WaveRenderer(camera, integrator, film, options), film, options, afterWave, before);
+  return renderWaves(WaveRenderer(camera, addSample, film, options), film, options, afterWave, before);
 }
 
 RenderResult render(const RayCamera& camera, BidirectionalIntegrator& integrator, Film& film,

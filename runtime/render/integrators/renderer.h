@@ -47,6 +47,9 @@ struct RenderResult {
   bool stopped = false;  ///< ended early because of RenderOptions::stop; some pixels may have further samples
 };
 
+/// Adds one sample to the pixel (x, y) of a film. Called concurrently for different pixels.
+using AddSample = std::function<void(int x, int y, Sampler& rng, PathStatistics& statistics)>;
+
 /// Called after each wave, from the calling thread, while no thread writes to the film.
 using AfterWave = std::function<void(const RenderResult&)>;
 
@@ -55,6 +58,10 @@ using AfterWave = std::function<void(const RenderResult&)>;
 /// samples that it lacks, so that the result has the same bytes as that of an uninterrupted run. `before` is the result
 /// of the run that has filled the film.
 RenderResult render(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options,
+                    const AfterWave& afterWave = {}, const RenderResult& before = {});
+/// The same for samples that are not only the radiance along a ray of their own pixel: addSample must add exactly one
+/// sample to the film.
+RenderResult render(const RayCamera& camera, const AddSample& addSample, const Film& film, const RenderOptions& options,
                     const AfterWave& afterWave = {}, const RenderResult& before = {});
 /// The same with light paths, sample by sample: sample s of pixel i is the radiance along its camera ray plus what the
 /// light paths of sample s of all pixels contribute to it. Rendering is only stopped between samples, so that all

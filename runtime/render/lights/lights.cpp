@@ -345,6 +345,28 @@ std::optional<LightSample> LightSelection::sampleTile(int cluster, int tile, con
   return LightSample{sample->wi, kInfinity, sample->radiance, sample->pdf, std::nullopt};
 }
 
+std::optional<LightSample> LightSelection::same(const LightSample& sample) const {
+  std::optional<LightSample> result = sample;
+  if (sample.light < 0) {
+    result->pdf = environmentPdf(sample.wi);
+    return result;
+  }
+  const float choice = probability(sample.light);
+  if (sample.delta) {
+    result = illuminate(lights_->deltaLight(sample.light), at_.position);
+    if (result) result->pdf = choice, result->light = sample.light;
+    return result;
+  }
+  const Vec3 toLight = sample.source->position - at_.position;
+  const float distance2 = toLight.squaredNorm();
+  result->distance = std::sqrt(distance2);
+  result->wi = toLight / result->distance;
+  const float cosine = -sample.source->normal.dot(result->wi);
+  if (!(cosine > 0.0f)) return std::nullopt;
+  result->pdf = choice * Lights::pdfOfArea(lights_->areas_[sample.light], at_.position, distance2, cosine);
+  return result;
+}
+
 float LightSelection::probability(int light) const {
   const int cluster = lights_->clusterOf_[light];
   if (cluster < 0) return 0.0f;

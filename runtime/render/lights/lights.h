@@ -72,6 +72,11 @@ class LightSelection {
   /// environment by radiance above its mean: the rest is left to BSDF sampling, so that the two have to be combined.
   std::optional<LightSample> sample(double choice, const Vec2& u) const;
 
+  /// The light sample of another receiver as this receiver would take it: the same point on the same light, or the same
+  /// direction towards light at infinity, with this receiver's density, which may be 0. nullopt: no light comes from
+  /// there. Not tested for occlusion.
+  std::optional<LightSample> same(const LightSample& sample) const;
+
   /// The density with which sample finds the direction towards `hit` on a light; 0 if the hit is not on the front side
   /// of a light.
   float pdf(const SurfaceHit& hit) const;
