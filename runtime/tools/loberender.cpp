@@ -36,6 +36,7 @@ const Names<BdptGuide> kGuideNames{
 const Names<RussianRoulette> kRussianRouletteNames{{"throughput", RussianRoulette::throughput},
                                                    {"efficiency", RussianRoulette::efficiency}};
 const Names<PixelSampling> kSamplerNames{{"sobol", PixelSampling::sobol}, {"independent", PixelSampling::independent}};
+const Names<ReconstructionNorm> kNormNames{{"l2", ReconstructionNorm::l2}, {"l1", ReconstructionNorm::l1}};
 const Names<bool> kFractionsNames{{"fixed", false}, {"learnt", true}};
 
 // The old names are accepted in version 0.2 only.
@@ -132,6 +133,12 @@ void declare(CLI::App& app, Options& options) {
       ->transform(oneOf(kIntegratorNames))
       ->default_str("auto");
   declareBidirectional(app, options);
+  app.add_option(
+         "--gradients", job.gradients,
+         "Gradient-domain rendering with path, guided or product: samples the differences of neighbouring pixels, "
+         "too, and reconstructs the picture from them in l2 (unbiased, except that negative pixels become zero) "
+         "or l1 (less noise from outliers, but biased)")
+      ->transform(oneOf(kNormNames));
   app.add_option("--spp", job.samples, "Number of samples per pixel");
   app.add_option("--sample-offset", job.sampleOffset,
                  "Index of the first sample, to render parts of a picture for lobecompare --merge")
@@ -209,7 +216,7 @@ void noteUnused(const Options& options) {
   for (const CLI::Option* option : options.training)
     note(option, option->get_name() == "--bsdf-fraction" ? job.mayUseProduct() : job.guided());
   note(options.reduction, job.guided());
-  note(options.roulette, job.guided() && job.integrator != IntegratorKind::bdpt);
+  note(options.roulette, job.guided() && job.integrator != IntegratorKind::bdpt && !job.gradients);
   if (!unused.empty())
     printNote("loberender", fmt::format("--integrator {} ignores {}", nameOf(job.integrator), fmt::join(unused, ", ")));
 }

@@ -71,6 +71,12 @@ void RenderJob::validate() const {
   require(reduction >= 0 && std::isfinite(reduction), "--reduction must be a finite number of at least 0");
   require(!outputs.empty(), "-o FILE is required");
   require(!record || guided(), "--record requires --integrator auto, guided or product, or bdpt with --guide");
+  require(!gradients || (integrator != IntegratorKind::bdpt && integrator != IntegratorKind::vcm),
+          "--gradients requires --integrator auto, path, guided or product");
+  require(!gradients || sampleOffset == 0,
+          "--gradients cannot be combined with --sample-offset, because a picture is reconstructed as a whole");
+  require(!gradients || (checkpoint.empty() && resume.empty()),
+          "--gradients cannot be combined with --checkpoint and --resume, because a checkpoint holds no gradients");
   require(merge.first > 0 && std::isfinite(merge.first), "--merge-radius must be a finite number greater than 0");
   require(merge.alpha > 0 && merge.alpha <= 1, "--merge-alpha must be greater than 0 and at most 1");
   require(!snapshotEvery || (*snapshotEvery >= 0 && std::isfinite(*snapshotEvery)),

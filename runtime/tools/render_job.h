@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "runtime/image/image.h"
+#include "runtime/render/gradients/poisson.h"
 #include "runtime/render/integrators/bidirectional_integrator.h"
 #include "runtime/render/integrators/renderer.h"
 #include "runtime/render/training/training.h"
@@ -39,6 +40,8 @@ struct RenderJob {
   BdptGuide guide = BdptGuide::none;  ///< only used by bdpt
   /// Radius of vertex merging of vcm in the first sample, as a fraction of the scene's diagonal, and how it shrinks.
   MergeRadius merge{0.0015f, 0.75f};
+  /// Gradient-domain rendering, and how the picture is reconstructed; empty: not used.
+  std::optional<ReconstructionNorm> gradients;
   std::optional<int> samples;     ///< per pixel; exactly one of samples and seconds is set
   int sampleOffset = 0;           ///< index of the first sample of every pixel
   std::optional<double> seconds;  ///< for training and rendering together

@@ -100,6 +100,8 @@ ImageAttributes attributes(const RenderJob& job, std::uint64_t sceneHash, const 
   else  // without "samples", so that such a picture is not merged as if all pixels had equally many
     all["interrupted"] = fmt::format("{} to {} samples per pixel", least, most);
   if (run.guiding.caches) all["cacheHashes"] = fmt::format("{:016x}", fmt::join(run.guiding.caches->hashes(), " "));
+  if (job.gradients)
+    all["gradients"] = *job.gradients == ReconstructionNorm::l2 ? "l2 (unbiased before clamping)" : "l1 (biased)";
   // Only written for --seconds, because pictures rendered with --spp must be byte-identical on every run.
   if (job.seconds) all["seconds"] = run.seconds();
   return all;
@@ -115,9 +117,9 @@ ConvergenceLog::ConvergenceLog(const RenderJob& job, const Scene& scene) : file_
                                          picture.height, reference_->width, reference_->height));
 }
 
-void ConvergenceLog::add(const Film& film, double seconds, int samples) {
+void ConvergenceLog::add(const Image& picture, double seconds, int samples) {
   if (!reference_) return;
-  const ErrorMetrics e = compareImages(*reference_, film.mean());
+  const ErrorMetrics e = compareImages(*reference_, picture);
   text_ += fmt::format("{:.3f},{},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g}\n", seconds, samples, e.mse, e.relmse,
                        e.relmseDrop01, e.relmseDrop1, e.meanRatio);
 }

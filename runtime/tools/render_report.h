@@ -50,7 +50,8 @@ class ConvergenceLog {
   /// Throws std::runtime_error if the reference cannot be read or has another size than the picture.
   ConvergenceLog(const RenderJob& job, const Scene& scene);
 
-  void add(const Film& film, double seconds, int samples);
+  void add(const Image& picture, double seconds, int samples);
+  bool isActive() const { return reference_.has_value(); }
   /// Throws std::runtime_error.
   void write() const;
 

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <variant>
 #include <vector>
 
@@ -115,6 +117,8 @@ class Run {
   void writeCheckpoint(OutputErrors& errors) const;
   std::string stopMessage() const;
   double prepared() const { return guiding_.seconds(); }
+  const Film& film() const { return gradients_ ? gradients_->pixels() : *film_; }
+  ReconstructedImage picture() const;
 
   const RenderJob& job_;
   const StopFlag& stop_;
@@ -130,6 +134,7 @@ class Run {
   RunSettings settings_;
   AnyIntegrator integrator_;
   std::optional<Film> film_;
+  std::optional<GradientFilm> gradients_;  // replaces film_ with --gradients
   RenderResult result_;
   OutputErrors errors_;
   Stopwatch sinceSnapshot_;
@@ -159,8 +164,11 @@ void Run::prepare() {
   const Stopwatch learning;
   renderScene_->lights.use(learnLightCells(*renderScene_, *camera_, job_.seed));
   guiding_.secondsLights = learning.seconds();
-  if (!film_) film_.emplace(camera_->width(), camera_->height());
-  if (!job_.checkpoint.empty() && film_->pixels().size() > kMaxCheckpointPixels)
+  if (job_.gradients)
+    gradients_.emplace(camera_->width(), camera_->height());
+  else if (!film_)
+    film_.emplace(camera_->width(), camera_->height());
+  if (!job_.checkpoint.empty() && film().pixels().size() > kMaxCheckpointPixels)
     throw std::runtime_error(fmt::format("--checkpoint: a checkpoint holds at most {} pixels", kMaxCheckpointPixels));
   const std::optional<Receiver> receiver = receiverFor(job_, *renderScene_, *camera_);
   if (job_.guided()) makeGuiding();
@@ -289,21 +297,33 @@ void Run::render() {
     result_ = result;
     progress.advance(fractionDone() - done);
     done = fractionDone();
-    log_->add(*film_, prepared() + result.total.seconds, result.total.samples);
+    if (log_->isActive()) log_->add(picture().image, prepared() + result.total.seconds, result.total.samples);
     if (snapshotIsDue()) snapshot();
   };
   result_ = std::visit(
-      [&](const auto& integrator) {
-        return lobe::render(*camera_, *integrator, *film_, options(), afterWave, result_);
+      [&]<class AnIntegrator>(const std::unique_ptr<AnIntegrator>& integrator) {
+        if constexpr (std::is_same_v<AnIntegrator, GradientIntegrator>)
+          return lobe::render(*camera_, *integrator, *gradients_, options(), afterWave, result_);
+        else
+          return lobe::render(*camera_, *integrator, *film_, options(), afterWave, result_);
       },
       integrator_);
 }
 
+ReconstructedImage Run::picture() const {
+  return gradients_ ? gradients_->reconstruct(*job_.gradients) : ReconstructedImage{film_->mean(), 0};
+}
+
 void Run::writeOutputs(OutputErrors& errors) const {
-  const RunResult result{result_, guiding_, *film_};
+  const RunResult result{result_, guiding_, film()};
   const std::uint64_t hash = pictureHash(*scene_);
   for (const auto& output : job_.outputs)
-    errors.attempt(output, [&] { writeImage(output, film_->mean(), attributes(job_, hash, result)); });
+    errors.attempt(output, [&] {
+      const ReconstructedImage written = picture();
+      ImageAttributes all = attributes(job_, hash, result);
+      if (gradients_) all["clampedFraction"] = written.clampedFraction;
+      writeImage(output, written.image, all);
+    });
   errors.attempt(job_.convergence, [&] { log_->write(); });
   if (!job_.stats.empty())
     errors.attempt(job_.stats, [&] { writeAtomically(job_.stats, jsonText(statistics(job_, load_, result)) + "\n"); });
@@ -314,13 +334,13 @@ void Run::writeCheckpoint(OutputErrors& errors) const {
   if (job_.checkpoint.empty()) return;
   errors.attempt(job_.checkpoint, [&] {
     const std::vector<std::byte> bytes =
-        encodeCheckpoint(settings_, *film_, result_, guiding_.training.report, illumination_, importance_);
+        encodeCheckpoint(settings_, film(), result_, guiding_.training.report, illumination_, importance_);
     writeAtomically(job_.checkpoint, std::span<const std::byte>(bytes));
   });
 }
 
 std::string Run::stopMessage() const {
-  const auto [least, most] = film_->sampleRange();
+  const auto [least, most] = film().sampleRange();
   std::string message = least == most ? fmt::format("{}", least) : fmt::format("{} to {}", least, most);
   if (job_.samples) message += fmt::format(" of {}", *job_.samples);
   message += most > 0 ? " samples per pixel are rendered and written" : " samples per pixel, so no picture is written";
@@ -329,9 +349,9 @@ std::string Run::stopMessage() const {
 }
 
 void Run::finish() {
-  if (const std::uint64_t dropped = film_->dropped(); dropped > 0)
+  if (const std::uint64_t dropped = film().dropped(); dropped > 0)
     printWarning(kTool, fmt::format("{} samples were negative or not finite, and were discarded", dropped));
-  if (film_->sampleRange().second > 0)
+  if (film().sampleRange().second > 0)
     writeOutputs(errors_);
   else
     writeCheckpoint(errors_);

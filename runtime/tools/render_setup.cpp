@@ -50,7 +50,7 @@ std::unique_ptr<Integrator> makeUnidirectional(const RenderJob& job, const Rende
   PathOptions options = pathOptions(job, scene.scene);
   auto path = std::make_unique<PathIntegrator>(scene, options);
   if (!guiding.sampler) return path;
-  if (job.russianRoulette == RussianRoulette::efficiency) {
+  if (job.russianRoulette == RussianRoulette::efficiency && !job.gradients) {
     learnCounts(job, scene, camera, options, guiding);
     options.counts = &*guiding.counts;
   }
@@ -67,6 +67,15 @@ std::unique_ptr<Integrator> makeUnidirectional(const RenderJob& job, const Rende
   guiding.pilot = {results[0], results[1], watch.seconds()};
   if (guiding.pilot->best() == IntegratorKind::path) return path;
   return guided;
+}
+
+/// With the sampler of the integrator, which has been chosen if it was to be.
+std::unique_ptr<GradientIntegrator> makeGradients(const RenderJob& job, const RenderScene& scene,
+                                                  const RayCamera& camera, const Guiding& guiding) {
+  const PathOptions options = pathOptions(job, scene.scene);
+  const bool path = !guiding.sampler || (guiding.pilot && guiding.pilot->best() == IntegratorKind::path);
+  if (path) return std::make_unique<PathGradients>(scene, camera, options);
+  return std::make_unique<GuidedGradients>(scene, camera, options, *guiding.sampler);
 }
 
 std::unique_ptr<BidirectionalIntegrator> makeBdpt(const RenderJob& job, const RenderScene& scene,
@@ -144,7 +153,9 @@ AnyIntegrator makeIntegrator(const RenderJob& job, const RenderScene& scene, con
                              Guiding& guiding) {
   if (job.integrator == IntegratorKind::bdpt) return makeBdpt(job, scene, camera, guiding);
   if (job.integrator == IntegratorKind::vcm) return makeVcm(job, scene, camera);
-  return makeUnidirectional(job, scene, camera, guiding);
+  std::unique_ptr<Integrator> integrator = makeUnidirectional(job, scene, camera, guiding);
+  if (job.gradients) return makeGradients(job, scene, camera, guiding);
+  return integrator;
 }
 
 }  // namespace lobe

@@ -8,6 +8,7 @@
 
 #include "runtime/guiding/brdf_caches.h"
 #include "runtime/guiding/rendered_samples.h"
+#include "runtime/render/gradients/gradient_integrator.h"
 #include "runtime/render/integrators/bidirectional_integrator.h"
 #include "runtime/render/integrators/guided_integrator.h"
 #include "runtime/render/integrators/pilot.h"
@@ -60,7 +61,8 @@ struct Guiding {
   }
 };
 
-using AnyIntegrator = std::variant<std::unique_ptr<Integrator>, std::unique_ptr<BidirectionalIntegrator>>;
+using AnyIntegrator = std::variant<std::unique_ptr<Integrator>, std::unique_ptr<BidirectionalIntegrator>,
+                                   std::unique_ptr<GradientIntegrator>>;
 
 /// The plan of training for the options.
 TrainingPlan planOf(const RenderJob& job);

@@ -167,6 +167,11 @@ TEST_CASE("loberender: invalid command lines are errors") {
       {" --spp 1 --integrator vcm --merge-radius 0", "--merge-radius"},
       {" --spp 1 --integrator vcm --merge-alpha 1.5", "--merge-alpha"},
       {" --spp 1 --integrator vcm --save-illumination a.illum", "bdpt with --guide"},
+      {" --spp 1 --gradients l3", "l2, l1"},
+      {" --spp 1 --gradients l2 --integrator bdpt", "--gradients requires --integrator auto, path, guided or product"},
+      {" --spp 1 --gradients l2 --integrator vcm", "--gradients requires --integrator auto, path, guided or product"},
+      {" --spp 1 --gradients l2 --sample-offset 1", "--gradients cannot be combined with --sample-offset"},
+      {" --spp 1 --gradients l2 --checkpoint c", "--gradients cannot be combined with --checkpoint"},
       {" --spp 1 --unknown", "--unknown"}};
   for (const auto& [options, word] : cases)
     CHECK_THAT(fault(folder, "loberender scene.xml -o a.exr" + options, 2), Catch::Contains(word));
@@ -241,6 +246,23 @@ TEST_CASE("loberender: bidirectional pictures do not depend on the number of thr
   CHECK(s.at("nonfinite_samples") == 0);
   CHECK(folder.run("loberender scene.xml --integrator path --spp 1 -o a.exr --guide product")
             .error.find("--integrator path ignores --guide") != std::string::npos);
+}
+
+TEST_CASE("loberender: pictures from gradients do not depend on the number of threads and are not negative") {
+  const SceneFolder folder(true);
+  const std::string integrator = GENERATE("path", "guided", "product");
+  const std::string norm = GENERATE("l2", "l1");
+  const std::string render =
+      "loberender scene.xml --spp 4 --seed 9 --integrator " + integrator + " --gradients " + norm + kTraining;
+  for (const std::string threads : {"1", "2", "7"})
+    REQUIRE(folder.run(render + " --threads " + threads + " -o " + threads + ".exr").code == 0);
+  CHECK(folder.bytes("1.exr") == folder.bytes("2.exr"));
+  CHECK(folder.bytes("1.exr") == folder.bytes("7.exr"));
+  for (const Rgb& pixel : readImage(folder / "1.exr").pixels) CHECK(pixel.minCoeff() >= 0);
+  const Imf::InputFile file((folder / "1.exr").c_str());
+  CHECK(file.header().typedAttribute<Imf::StringAttribute>("gradients").value().substr(0, 2) == norm);
+  CHECK(number(file.header(), "clampedFraction") >= 0);
+  CHECK(number(file.header(), "clampedFraction") < 0.1);
 }
 
 TEST_CASE("loberender: statistics and convergence and images of a run") {
