@@ -174,6 +174,8 @@ TEST_CASE("unbiased: gradients of glossy surfaces under a lamp", "[slow][gradien
         <texture type="checkerboard" name="alpha"><float name="uscale" value="6"/><float name="vscale" value="6"/>
           <rgb name="color0" value="0.1, 0.1, 0.1"/><rgb name="color1" value="0.4, 0.4, 0.4"/></texture></bsdf></shape>
     <shape type="sphere"><point name="center" x="-1" y="0" z="1"/>
+      <bsdf type="roughconductor"><float name="alpha" value="0.01"/></bsdf></shape>
+    <shape type="sphere"><point name="center" x="0.3" y="-1.2" z="0.5"/><float name="radius" value="0.5"/>
       <bsdf type="roughplastic"><float name="alpha" value="0.1"/></bsdf></shape>
     <shape type="sphere"><point name="center" x="1.2" y="0.4" z="1"/>
       <bsdf type="plastic"><rgb name="diffuse_reflectance" value="0.2, 0.3, 0.7"/></bsdf></shape>)");
@@ -184,6 +186,8 @@ TEST_CASE("unbiased: gradients of smooth and frosted glass", "[slow][gradients]"
       <bsdf type="dielectric"/></shape>
     <shape type="sphere"><point name="center" x="1.1" y="0" z="1"/>
       <bsdf type="roughdielectric"><string name="distribution" value="ggx"/><float name="alpha" value="0.15"/></bsdf></shape>
+    <shape type="sphere"><point name="center" x="0" y="-0.8" z="0.5"/><float name="radius" value="0.5"/>
+      <bsdf type="roughdielectric"><float name="alpha" value="0.01"/></bsdf></shape>
     <shape type="rectangle"><transform name="to_world"><scale value="0.7"/><rotate x="1" angle="80"/>
       <translate y="-2" z="0.8"/></transform><bsdf type="thindielectric"/></shape>)");
 }
