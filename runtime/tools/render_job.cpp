@@ -39,8 +39,8 @@ bool RenderJob::mayUseProduct() const {
 }
 
 bool RenderJob::learnsWhileRendering() const {
-  return seconds && guided() && integrator != IntegratorKind::bdpt && illumination.empty() && resume.empty() &&
-         reduction == 0;
+  return seconds && guided() && integrator != IntegratorKind::bdpt && !gradients && illumination.empty() &&
+         resume.empty() && reduction == 0;
 }
 
 void RenderJob::validate() const {

@@ -18,7 +18,7 @@ Corners cornersOf(const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& 
     const Vec3& p = mesh.positions[vertex];
     return Point{p.x() + 0.0f, p.y() + 0.0f, p.z() + 0.0f};
   });
-  std::ranges::rotate(corners, std::ranges::min_element(corners));
+  std::rotate(corners.begin(), std::min_element(corners.begin(), corners.end()), corners.end());
   return corners;
 }
 
