@@ -44,6 +44,7 @@ struct DeltaTransmission {
   Vec3 wi;
   Rgb weight;     ///< as DeltaSample::weight, but for the transmission alone: not divided by a probability
   bool straight;  ///< wi is −wo
+  float eta = 1;  ///< relative index of refraction as in BsdfSample
 };
 
 /// A lobe and its weight in a BSDF: ρ_bsdf ≈ Σ tint_i ρ_i + constant/π, in luminance, for wo above the surface.

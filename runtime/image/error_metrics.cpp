@@ -3,9 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 
 #include <fmt/format.h>
+
+#include "runtime/core/colour.h"
+#include "runtime/core/statistics.h"
 
 namespace lobe {
 namespace {
@@ -36,6 +40,65 @@ double trimmedMean(const std::vector<float>& sorted, double fraction) {
   return kept > 0 ? sum / static_cast<double>(kept) : 0.0;
 }
 
+// The fraction of the sum of the sorted values that the given fraction of largest ones has.
+double shareOfWorst(const std::vector<float>& sorted, double fraction) {
+  const auto worst = static_cast<std::ptrdiff_t>(std::ceil(fraction * static_cast<double>(sorted.size())));
+  const double sum = std::accumulate(sorted.begin(), sorted.end(), 0.0);
+  return sum > 0 ? std::accumulate(sorted.end() - worst, sorted.end(), 0.0) / sum : 0.0;
+}
+
+// The standard error of the mean over all pixels that are not NaN. Blocks at the border count less, by their size.
+double standardError(const std::vector<float>& errors, int width, int height) {
+  struct Block {
+    double sum = 0, count = 0;
+  };
+  const int columns = (width + kErrorBlock - 1) / kErrorBlock, rows = (height + kErrorBlock - 1) / kErrorBlock;
+  std::vector<Block> blocks(static_cast<std::size_t>(columns) * rows);
+  Block all;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const double error = errors[static_cast<std::size_t>(y) * width + x];
+      if (std::isnan(error)) continue;
+      Block& block = blocks[static_cast<std::size_t>(y / kErrorBlock) * columns + x / kErrorBlock];
+      block.sum += error, all.sum += error;
+      block.count += 1, all.count += 1;
+    }
+  const auto n = static_cast<double>(blocks.size());
+  if (n < 2 || all.count == 0) return std::numeric_limits<double>::quiet_NaN();
+  double squares = 0;
+  for (const Block& block : blocks) {
+    const double residual = block.sum - block.count * all.sum / all.count;
+    squares += residual * residual;
+  }
+  return std::sqrt(squares * n / (n - 1)) / all.count;
+}
+
+double finiteLuminance(const Rgb& c) {
+  return c.allFinite() ? luminance(c) : 0.0;
+}
+
+// The median luminance of the 5×5 pixels around a pixel, without itself.
+double medianAround(const Image& image, int x, int y) {
+  std::vector<double> values;
+  for (int j = std::max(0, y - 2); j <= std::min(image.height - 1, y + 2); ++j)
+    for (int i = std::max(0, x - 2); i <= std::min(image.width - 1, x + 2); ++i)
+      if (i != x || j != y) values.push_back(finiteLuminance(image.at(i, j)));
+  return values.empty() ? 0.0 : median(values);
+}
+
+std::size_t countFireflies(const Image& reference, const Image& image) {
+  double dark = 0;
+  for (const Rgb& pixel : reference.pixels)
+    dark += 0.01 * finiteLuminance(pixel) / static_cast<double>(reference.pixels.size());
+  std::size_t count = 0;
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) {
+      const double value = finiteLuminance(image.at(x, y)) / kFirefly;
+      if (value > dark && value > finiteLuminance(reference.at(x, y)) && value > medianAround(image, x, y)) ++count;
+    }
+  return count;
+}
+
 double squaredDistance(const Rgb& a, const Rgb& b) {
   return (a.cast<double>() - b.cast<double>()).square().sum();
 }
@@ -63,6 +126,8 @@ std::vector<float> relativeErrors(const Image& reference, const Image& image) {
 ErrorMetrics compareImages(const Image& reference, const Image& image) {
   std::vector<float> errors = relativeErrors(reference, image);
   ErrorMetrics metrics;
+  metrics.relmseError = standardError(errors, image.width, image.height);
+  metrics.fireflies = countFireflies(reference, image);
   double squares = 0, sumImage = 0, sumReference = 0;
   for (std::size_t i = 0; i < errors.size(); ++i) {
     if (std::isnan(errors[i])) continue;
@@ -77,6 +142,7 @@ ErrorMetrics compareImages(const Image& reference, const Image& image) {
   metrics.relmse = trimmedMean(errors, 0.0);
   metrics.relmseDrop01 = trimmedMean(errors, 0.001);
   metrics.relmseDrop1 = trimmedMean(errors, 0.01);
+  metrics.worst = {shareOfWorst(errors, 0.0001), shareOfWorst(errors, 0.001), shareOfWorst(errors, 0.01)};
   metrics.meanRatio = sumReference == 0.0 ? std::numeric_limits<double>::quiet_NaN() : sumImage / sumReference;
   return metrics;
 }

@@ -99,20 +99,28 @@ void printJson(const std::vector<Comparison>& comparisons) {
     array.push_back({{"image", image},
                      {"mse", m.mse},
                      {"relmse", m.relmse},
+                     {"relmse_error", m.relmseError},
                      {"relmse_drop_0.1pct", m.relmseDrop01},
                      {"relmse_drop_1pct", m.relmseDrop1},
                      {"mean_ratio", m.meanRatio},
-                     {"nonfinite", m.nonfinite}});
+                     {"nonfinite", m.nonfinite},
+                     {"worst_0.01pct_fraction", m.worst.fraction001},
+                     {"worst_0.1pct_fraction", m.worst.fraction01},
+                     {"worst_1pct_fraction", m.worst.fraction1},
+                     {"fireflies", m.fireflies}});
   fmt::print("{}\n", lobe::jsonText(array));
 }
 
 void printTable(const std::vector<Comparison>& comparisons) {
-  lobe::Table table(
-      {"image", "mse", "relmse", "without worst 0.1 %", "without worst 1 %", "ratio of means", "non-finite"});
+  lobe::Table table({"image", "mse", "relmse", "without worst 0.1 %", "without worst 1 %", "ratio of means",
+                     "non-finite", "worst 0.01 / 0.1 / 1 % of the error", "fireflies"});
   for (const auto& [image, m] : comparisons)
-    table.add({image, fmt::format("{:.6g}", m.mse), fmt::format("{:.6g}", m.relmse),
+    table.add({image, fmt::format("{:.6g}", m.mse), fmt::format("{:.6g} ± {:.2g}", m.relmse, m.relmseError),
                fmt::format("{:.6g}", m.relmseDrop01), fmt::format("{:.6g}", m.relmseDrop1),
-               fmt::format("{:.5f}", m.meanRatio), fmt::format("{}", m.nonfinite)});
+               fmt::format("{:.5f}", m.meanRatio), fmt::format("{}", m.nonfinite),
+               fmt::format("{:.0f} / {:.0f} / {:.0f} %", 100 * m.worst.fraction001, 100 * m.worst.fraction01,
+                           100 * m.worst.fraction1),
+               fmt::format("{}", m.fireflies)});
   table.print(stdout);
 }
 

@@ -33,6 +33,8 @@ const Names<IntegratorKind> kIntegratorNames{{"auto", IntegratorKind::automatic}
                                              {"guided", IntegratorKind::guided},  {"product", IntegratorKind::product}};
 const Names<BdptGuide> kGuideNames{
     {"none", BdptGuide::none}, {"illumination", BdptGuide::illumination}, {"product", BdptGuide::product}};
+const Names<LightPathUse> kLightPathNames{
+    {"auto", LightPathUse::automatic}, {"on", LightPathUse::on}, {"off", LightPathUse::off}};
 const Names<RussianRoulette> kRussianRouletteNames{{"throughput", RussianRoulette::throughput},
                                                    {"efficiency", RussianRoulette::efficiency}};
 const Names<PixelSampling> kSamplerNames{{"sobol", PixelSampling::sobol}, {"independent", PixelSampling::independent}};
@@ -51,7 +53,7 @@ struct Options {
   int threads = 0;
   bool check = false, json = false;
   // Options that some integrators ignore.
-  const CLI::Option *guide = nullptr, *reduction = nullptr, *roulette = nullptr;
+  const CLI::Option *guide = nullptr, *reduction = nullptr, *roulette = nullptr, *lightPaths = nullptr;
   std::vector<const CLI::Option*> training, merging;
 };
 
@@ -159,6 +161,12 @@ void declare(CLI::App& app, Options& options) {
          "Russian roulette by throughput, or efficiency-aware Russian roulette and splitting (guided and product)")
       ->transform(oneOf(kRussianRouletteNames))
       ->default_str("efficiency");
+  app.add_option(
+         "--light-paths", job.lightPaths,
+         "Combine the camera paths of guided and product with light paths that are connected to the camera, which "
+         "find caustics: on, off, or auto: where they lower the error, outliers included, in equal time")
+      ->transform(oneOf(kLightPathNames))
+      ->default_str("auto");
   app.add_option("--shadow-surfaces", job.shadowSurfaces,
                  "Number of glass, mask or null surfaces that next-event estimation sees through (0: none)")
       ->check(CLI::Range(0, 1000))
@@ -198,6 +206,7 @@ void declare(CLI::App& app, Options& options) {
                    "Only read the scene and print all faults, warnings and notes; exit with 1 if it cannot be read");
   app.add_flag("--json", options.json, "Print the result of --check as JSON")->needs(check);
   options.reduction = app.get_option("--reduction");
+  options.lightPaths = app.get_option("--light-paths");
   options.roulette = app.get_option("--russian-roulette");
   declareTraining(app, options);
   addDefinitions(app, job.definitions);
@@ -216,6 +225,7 @@ void noteUnused(const Options& options) {
   for (const CLI::Option* option : options.training)
     note(option, option->get_name() == "--bsdf-fraction" ? job.mayUseProduct() : job.guided());
   note(options.reduction, job.guided());
+  note(options.lightPaths, job.mayUseLightPaths());
   note(options.roulette, job.guided() && job.integrator != IntegratorKind::bdpt && !job.gradients);
   if (!unused.empty())
     printNote("loberender", fmt::format("--integrator {} ignores {}", nameOf(job.integrator), fmt::join(unused, ", ")));

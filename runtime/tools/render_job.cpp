@@ -28,6 +28,11 @@ const char* nameOf(BdptGuide guide) {
   return names[static_cast<std::size_t>(guide)];
 }
 
+const char* nameOf(LightPathUse use) {
+  constexpr std::array names{"auto", "on", "off"};
+  return names[static_cast<std::size_t>(use)];
+}
+
 bool RenderJob::guided() const {
   return integrator == IntegratorKind::bdpt ? guide != BdptGuide::none
                                             : integrator == IntegratorKind::guided || mayUseProduct();

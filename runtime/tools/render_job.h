@@ -29,6 +29,12 @@ const char* nameOf(BdptGuide guide);
 /// Russian roulette by the path's throughput, or efficiency-aware Russian roulette and splitting (sample_counts.h).
 enum class RussianRoulette { throughput, efficiency };
 
+/// Whether guided and product combine camera paths with light paths. automatic: where that lowers the error in equal
+/// time (light_path_plan.h).
+enum class LightPathUse { automatic, on, off };
+/// The name that the option has.
+const char* nameOf(LightPathUse use);
+
 struct RenderJob {
   std::filesystem::path scene;
   std::map<std::string, std::string> definitions;
@@ -37,7 +43,8 @@ struct RenderJob {
   std::vector<std::filesystem::path> outputs;
 
   IntegratorKind integrator = IntegratorKind::automatic;
-  BdptGuide guide = BdptGuide::none;  ///< only used by bdpt
+  BdptGuide guide = BdptGuide::none;                  ///< only used by bdpt
+  LightPathUse lightPaths = LightPathUse::automatic;  ///< only used by guided and product
   /// Radius of vertex merging of vcm in the first sample, as a fraction of the scene's diagonal, and how it shrinks.
   MergeRadius merge{0.0015f, 0.75f};
   /// Gradient-domain rendering, and how the picture is reconstructed; empty: not used.
@@ -73,6 +80,8 @@ struct RenderJob {
 
   /// Whether illumination is trained, from which the integrator may sample directions.
   bool guided() const;
+  /// Whether camera paths may be combined with light paths.
+  bool mayUseLightPaths() const { return guided() && integrator != IntegratorKind::bdpt; }
   /// Whether directions may be sampled from the product, which needs BRDF caches.
   bool mayUseProduct() const;
 

@@ -48,6 +48,18 @@ nlohmann::ordered_json asJson(const std::optional<Pilot>& pilot) {
   return {{"seconds", pilot->seconds}, {"path", one(pilot->path)}, {"product", one(pilot->product)}};
 }
 
+nlohmann::ordered_json asJson(const std::optional<LightPathTrial>& trial, bool used, double seconds) {
+  if (!trial) return nullptr;
+  return {{"used", used},
+          {"seconds", seconds},
+          {"paths_per_pixel", trial->pathsPerPixel},
+          {"variance", trial->variance},
+          {"second_moment", trial->secondMoment},
+          {"second_moment_left", trial->left},
+          {"cost", trial->cost},
+          {"cost_with_light_paths", trial->costWithLight}};
+}
+
 }  // namespace
 
 nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, const RunResult& run) {
@@ -57,6 +69,7 @@ nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, c
   for (const PassReport& pass : run.training().passes) passes.push_back(asJson(pass));
   return {{"integrator", nameOf(run.integrator(job))},
           {"pilot", asJson(run.guiding.pilot)},
+          {"light_paths", asJson(run.guiding.lightPaths, run.guiding.usesLightPaths, run.guiding.secondsLightPaths)},
           {"seed", job.seed},
           {"seconds_reading", load.reading},
           {"seconds_building", load.building},
@@ -99,6 +112,7 @@ ImageAttributes attributes(const RenderJob& job, std::uint64_t sceneHash, const 
     all["samples"] = static_cast<double>(least);
   else  // without "samples", so that such a picture is not merged as if all pixels had equally many
     all["interrupted"] = fmt::format("{} to {} samples per pixel", least, most);
+  if (run.guiding.usesLightPaths) all["lightPathsPerPixel"] = run.guiding.lightPaths->pathsPerPixel;
   if (run.guiding.caches) all["cacheHashes"] = fmt::format("{:016x}", fmt::join(run.guiding.caches->hashes(), " "));
   if (job.gradients)
     all["gradients"] = *job.gradients == ReconstructionNorm::l2 ? "l2 (unbiased before clamping)" : "l1 (biased)";

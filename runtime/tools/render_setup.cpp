@@ -44,9 +44,32 @@ PathOptions pathOptions(const RenderJob& job, const Scene& scene) {
   return options;
 }
 
+/// Guided path tracing with light paths; null if they do not pay.
+std::unique_ptr<BidirectionalIntegrator> makeWithLightPaths(const RenderJob& job, const RenderScene& scene,
+                                                            const RayCamera& camera, const PathOptions& options,
+                                                            Guiding& guiding) {
+  // Light paths must be better by this factor, because the trial is not exact.
+  constexpr double kGain = 0.9;
+  constexpr double kPaths = 100000;
+  if (job.lightPaths == LightPathUse::off || scene.lights.empty()) return nullptr;
+  const Stopwatch watch;
+  const int paths = static_cast<int>(kPaths * preparationSize(job));
+  if (scene.lights.environmentProbability() > 0)
+    guiding.environmentGuide.emplace(learnEnvironmentGuide(scene, camera, *guiding.sampler, paths, job.seed));
+  const PhotonEmission emission(scene.lights, guiding.environmentGuide ? &*guiding.environmentGuide : nullptr);
+  guiding.lightPaths = tryLightPaths(scene, camera, options, *guiding.sampler, emission, paths, job.seed);
+  guiding.secondsLightPaths = watch.seconds();
+  const LightPathTrial& trial = *guiding.lightPaths;
+  guiding.usesLightPaths =
+      job.lightPaths == LightPathUse::on || trial.inefficiencyWithLight() < kGain * trial.inefficiency();
+  if (!guiding.usesLightPaths) return nullptr;
+  return std::make_unique<GuidedLightIntegrator>(scene, camera, options, *guiding.sampler,
+                                                 LightTracing{trial.pathsPerPixel, emission});
+}
+
 /// path, guided or product.
-std::unique_ptr<Integrator> makeUnidirectional(const RenderJob& job, const RenderScene& scene, const RayCamera& camera,
-                                               Guiding& guiding) {
+AnyIntegrator makeUnidirectional(const RenderJob& job, const RenderScene& scene, const RayCamera& camera,
+                                 Guiding& guiding) {
   PathOptions options = pathOptions(job, scene.scene);
   auto path = std::make_unique<PathIntegrator>(scene, options);
   if (!guiding.sampler) return path;
@@ -56,16 +79,18 @@ std::unique_ptr<Integrator> makeUnidirectional(const RenderJob& job, const Rende
   }
   if (guiding.rendered) options.rendered = &*guiding.rendered;
   auto guided = std::make_unique<GuidedIntegrator>(scene, options, *guiding.sampler);
-  if (job.integrator != IntegratorKind::automatic) return guided;
-  const Stopwatch watch;
-  PilotOptions pilot;
-  pilot.tiles = static_cast<int>(pilot.tiles * preparationSize(job));
-  pilot.seed = job.seed;
-  // The same picture for a seed is only promised for --spp.
-  pilot.timed = job.seconds.has_value();
-  const auto results = comparePilots(camera, std::array<const Integrator*, 2>{path.get(), guided.get()}, pilot);
-  guiding.pilot = {results[0], results[1], watch.seconds()};
-  if (guiding.pilot->best() == IntegratorKind::path) return path;
+  if (job.integrator == IntegratorKind::automatic) {
+    const Stopwatch watch;
+    PilotOptions pilot;
+    pilot.tiles = static_cast<int>(pilot.tiles * preparationSize(job));
+    pilot.seed = job.seed;
+    // The same picture for a seed is only promised for --spp.
+    pilot.timed = job.seconds.has_value();
+    const auto results = comparePilots(camera, std::array<const Integrator*, 2>{path.get(), guided.get()}, pilot);
+    guiding.pilot = {results[0], results[1], watch.seconds()};
+    if (guiding.pilot->best() == IntegratorKind::path) return path;
+  }
+  if (auto withLightPaths = makeWithLightPaths(job, scene, camera, options, guiding)) return withLightPaths;
   return guided;
 }
 
@@ -137,6 +162,7 @@ RunSettings settingsOf(const RenderJob& job, const Scene& scene, const Guiding& 
   all.emplace_back("--reduction", fmt::format("{}", job.reduction));
   all.emplace_back("--russian-roulette",
                    job.russianRoulette == RussianRoulette::efficiency ? "efficiency" : "throughput");
+  if (job.mayUseLightPaths()) all.emplace_back("--light-paths", nameOf(job.lightPaths));
   all.emplace_back("the hash of --illumination", stored ? fmt::format("{:016x}", stored->header().hash) : "none");
   all.emplace_back("--train", from->first);
   all.emplace_back("--passes", job.passes ? std::to_string(*job.passes) : "the default");

@@ -14,6 +14,7 @@
 #include "runtime/render/integrators/pilot.h"
 #include "runtime/render/integrators/renderer.h"
 #include "runtime/render/integrators/sample_counts.h"
+#include "runtime/render/training/light_path_plan.h"
 #include "runtime/render/training/training.h"
 #include "runtime/tools/checkpoint.h"
 #include "runtime/tools/render_job.h"
@@ -47,10 +48,14 @@ struct Guiding {
   double secondsLights = 0;                 ///< time for learning the choice of lights
   double secondsCounts = 0;                 ///< time for learning the counts
   std::optional<Pilot> pilot;
+  std::optional<EnvironmentGuide> environmentGuide;  ///< of the light paths of guided and product
+  std::optional<LightPathTrial> lightPaths;          ///< if they were tried
+  bool usesLightPaths = false;
+  double secondsLightPaths = 0;  ///< time for trying them
 
   /// Time spent before rendering.
   double seconds() const {
-    return secondsLights + training.report.seconds + secondsCounts + (pilot ? pilot->seconds : 0);
+    return secondsLights + training.report.seconds + secondsCounts + (pilot ? pilot->seconds : 0) + secondsLightPaths;
   }
   const LobeCacheSet* cachesOrNull() const { return caches ? &*caches : nullptr; }
   std::size_t unreducedBytes = 0;  ///< size of the records before merging
@@ -75,7 +80,8 @@ RunSettings settingsOf(const RenderJob& job, const Scene& scene, const Guiding& 
                        const std::optional<IlluminationFile>& stored);
 
 /// The integrator of the job. Learns the counts of samples if it uses them, and sets guiding.counts; for
-/// IntegratorKind::automatic, compares path and product, and sets guiding.pilot. The integrator refers to `guiding`.
+/// IntegratorKind::automatic, compares path and product, and sets guiding.pilot; tries light paths, and sets
+/// guiding.lightPaths. The integrator refers to `guiding`.
 AnyIntegrator makeIntegrator(const RenderJob& job, const RenderScene& scene, const RayCamera& camera, Guiding& guiding);
 
 }  // namespace lobe

@@ -43,13 +43,14 @@ Scene sceneWith(const std::string& body, const std::string& camera = kCamera) {
   return readText("<scene version=\"3.0.0\">" + body + camera + "</scene>");
 }
 
-/// Whether both integrators agree on the scene.
+/// Whether bidirectional path tracing, and path tracing with light paths, agree with path tracing on the scene.
 bool agreesWithPath(const Stage& stage, int batches = 48, int samples = 12) {
   const auto path = renderBlocks(stage, stage.path(), {batches, 2 * samples, 1});
   double light = 0;
   for (const Block& block : path) light += block.mean;
   REQUIRE(light > 0);
-  return agree(path, renderBlocks(stage, stage.bdpt(), {batches, samples, 1000}));
+  return agree(path, renderBlocks(stage, stage.bdpt(), {batches, samples, 1000})) &&
+         agree(path, renderBlocks(stage, stage.pathWithLight(), {batches, samples, 2000}));
 }
 
 }  // namespace
@@ -86,18 +87,26 @@ TEST_CASE("bidirectional: every kind of light gives the image of path tracing") 
   CHECK(agreesWithPath(Stage(sceneWith(kFloor + light))));
 }
 
-TEST_CASE("bidirectional: an environment with a bright spot gives the image of path tracing") {
+namespace {
+
+/// An environment with a broad bright spot above the back wall, in a scene in which +z is up.
+Environment brightSpot() {
   Image image(32, 16);
   for (int y = 0; y < 16; ++y)
     for (int x = 0; x < 32; ++x) {
       const float dx = static_cast<float>(x - 20) / 3, dy = static_cast<float>(y - 4) / 2;
       image.at(x, y) = grey(0.1f + 6 * std::exp(-dx * dx - dy * dy));
     }
-  Scene scene = sceneWith(kFloor);
-  // Up is +z in the scene.
   Eigen::Matrix3f toWorld;
   toWorld << 1, 0, 0, 0, 0, -1, 0, 1, 0;
-  scene.environment = Environment{std::move(image), toWorld};
+  return {std::move(image), toWorld};
+}
+
+}  // namespace
+
+TEST_CASE("bidirectional: an environment with a bright spot gives the image of path tracing") {
+  Scene scene = sceneWith(kFloor);
+  scene.environment = brightSpot();
   CHECK(agreesWithPath(Stage(std::move(scene))));
 }
 
@@ -170,6 +179,7 @@ TEST_CASE("bidirectional: shading normals inside glass give the image of path tr
   const Stage stage(std::move(scene));
   const auto path = renderBlocks(stage, stage.path(), {48, 200, 1});
   CHECK(agree(path, renderBlocks(stage, stage.bdpt(), {48, 24, 1000})));
+  CHECK(agree(path, renderBlocks(stage, stage.pathWithLight(), {48, 24, 2000})));
 }
 
 TEST_CASE("bidirectional: the caustic of a glass ball under a small lamp is that of path tracing") {
@@ -181,13 +191,19 @@ TEST_CASE("bidirectional: the caustic of a glass ball under a small lamp is that
   const int samples = 12, samplesOfPath = 160;
   const auto path = renderBlocks(stage, stage.path(), {48, samplesOfPath, 1});
   const auto bdpt = renderBlocks(stage, stage.bdpt(), {48, samples, 1000});
+  const auto light = renderBlocks(stage, stage.pathWithLight(), {48, samples, 2000});
+  const auto fewer = renderBlocks(stage, stage.pathWithLight(0.25), {48, samples, 3000});
   CHECK(agree(path, bdpt));
+  CHECK(agree(path, light));
+  CHECK(agree(path, fewer));
   const auto variance = [](const std::vector<Block>& all) {
     double sum = 0;
     for (const Block& block : all) sum += block.variance;
     return sum;
   };
   CHECK(samples * variance(bdpt) < 0.5 * samplesOfPath * variance(path));
+  CHECK(samples * variance(light) < 0.5 * samplesOfPath * variance(path));
+  CHECK(samples * variance(fewer) < 0.5 * samplesOfPath * variance(path));
 }
 
 TEST_CASE("bidirectional: every kind of camera gives the image of path tracing") {
@@ -261,6 +277,8 @@ TEST_CASE("bidirectional: the radiance in a furnace is emission over one minus a
   const Stage stage(std::move(scene));
   const auto found = renderBlocks(stage, stage.bdpt(), {48, 16, 1});
   CHECK(agree(found, std::vector<Block>(found.size(), Block{emission / (1 - albedo), 0})));
+  const auto withLight = renderBlocks(stage, stage.pathWithLight(2.5), {48, 16, 1});
+  CHECK(agree(withLight, std::vector<Block>(found.size(), Block{emission / (1 - albedo), 0})));
 }
 
 TEST_CASE("vcm: the radiance in a furnace is emission over one minus albedo") {
@@ -411,6 +429,68 @@ TEST_CASE("bidirectional: stopped at any moment and continued, an image has the 
   checkStopping(stage, VcmIntegrator(stage.ready, stage.camera, stage.options, {0.3f, 0.5f}));
 }
 
+TEST_CASE("light paths: light that next-event estimation sees through surfaces gives the image of path tracing") {
+  const auto [name, material] = GENERATE(table<std::string, std::string>(
+      {{"slab", R"(<bsdf type="dielectric"/>)"},
+       {"panes", R"(<bsdf type="thindielectric"/>)"},
+       {"mask", R"(<bsdf type="mask"><float name="opacity" value="0.4"/><bsdf type="roughplastic"/></bsdf>)"},
+       {"blend", R"(<bsdf type="blendbsdf"><float name="weight" value="0.5"/><bsdf type="dielectric"/>
+          <bsdf type="diffuse"/></bsdf>)"}}));
+  CAPTURE(name);
+  const std::string slab =
+      "<shape type=\"cube\"><transform name=\"to_world\"><scale x=\"3\" y=\"3\" z=\"0.1\"/>"
+      "<rotate x=\"1\" angle=\"15\"/><translate z=\"2.6\"/></transform>" +
+      material + "</shape>";
+  const std::string point = R"(<emitter type="point"><point name="position" x="1" y="-1" z="4"/>
+    <rgb name="intensity" value="3, 2, 1"/></emitter>)";
+  const std::string lamp = R"(<shape type="sphere"><point name="center" x="1" y="0" z="4"/>
+    <float name="radius" value="0.4"/><emitter type="area"><rgb name="radiance" value="9, 8, 7"/></emitter></shape>)";
+  // Inside water, too, where light has another solid angle than outside.
+  const std::string water = R"(<shape type="cube"><transform name="to_world"><scale x="4" y="8" z="1"/>
+    <translate z="0.5"/></transform><bsdf type="dielectric"><float name="int_ior" value="1.33"/></bsdf></shape>)";
+  const bool wet = GENERATE(false, true);
+  Scene scene = sceneWith(kFloor + slab + lamp + point + (wet ? water : ""));
+  scene.environment = brightSpot();
+  Stage stage(std::move(scene));
+  SECTION("to any depth") {}
+  SECTION("to a depth") {
+    stage.options.maxDepth = 4;
+  }
+  const auto path = renderBlocks(stage, stage.path(), {48, 48, 1});
+  CHECK(agree(path, renderBlocks(stage, stage.pathWithLight(), {48, 24, 2000})));
+}
+
+TEST_CASE("light paths: guided emission of the environment gives the image of path tracing") {
+  Scene scene = sceneWith(std::string(kFloor) + kLamp + R"(<shape type="sphere">
+    <point name="center" x="0.8" y="-0.3" z="1"/><float name="radius" value="0.9"/><bsdf type="dielectric"/></shape>)");
+  scene.environment = brightSpot();
+  const Stage stage(std::move(scene));
+  // Learns from where light comes to a few points.
+  EnvironmentGuide guide(stage.ready.lights);
+  Rng rng(3);
+  for (int i = 0; i < 3000; ++i) {
+    const Vec3 point(3 * rng.uniform() - 1, 3 * rng.uniform() - 2, 0);
+    const auto from = stage.ready.lights.environment()->sample(rng.uniform2());
+    if (from && from->wi.z() > 0) guide.learn(point, from->wi, rng.uniform());
+  }
+  guide.update();
+  const PhotonEmission emission(stage.ready.lights, &guide);
+  // The density is that of the samples, except where rounding chooses the bin on the other side of a border.
+  int found = 0, equal = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const auto photon = guide.sample(rng.uniformDouble(), rng.uniform2(), rng.uniform2());
+    if (!photon) continue;
+    const Vec3 point = photon->ray.origin + 2.5f * photon->ray.direction;
+    ++found;
+    if (std::abs(guide.density(point, -photon->ray.direction) / photon->density - 1) < 1e-3f) ++equal;
+  }
+  CHECK(found > 500);
+  CHECK(equal > 0.98 * found);
+  const auto path = renderBlocks(stage, stage.path(), {48, 160, 1});
+  const PathWithLight<> guided(stage.ready, stage.camera, stage.options, {0.5, emission});
+  CHECK(agree(path, renderBlocks(stage, guided, {48, 24, 2000})));
+}
+
 TEST_CASE("bidirectional: a choice of lights that depends on the place gives the image of path tracing") {
   // Each part of the room has a lamp of its own, so that the learnt probabilities differ between neighbours.
   std::string lamps;
@@ -442,6 +522,7 @@ struct WrongGuide {
       return sample;
     }
     float pdf(const Vec3& wi) const { return fault_ * right_.pdf(wi); }
+    static std::optional<VertexEstimate> estimate() { return std::nullopt; }
 
    private:
     float fault_;
@@ -471,6 +552,24 @@ TEST_CASE("bidirectional: a wrong density of either subpath is detected") {
   CHECK(agree(path, renderBlocks(stage, WrongBdpt(stage, 1, 1), {48, 12, 1000})));
   CHECK_FALSE(agree(path, renderBlocks(stage, WrongBdpt(stage, 1.2f, 1), {48, 12, 1000})));
   CHECK_FALSE(agree(path, renderBlocks(stage, WrongBdpt(stage, 1, 1.2f), {48, 12, 1000})));
+}
+
+TEST_CASE("light paths: a wrong density of any technique is detected") {
+  // The ball makes caustics; the environment is sampled through it, too.
+  const Stage stage(sceneWith(std::string(kFloor) + kLamp + R"(
+    <shape type="sphere"><point name="center" x="0.8" y="-0.3" z="1"/><float name="radius" value="0.9"/>
+      <bsdf type="dielectric"/></shape>
+    <emitter type="constant"><rgb name="radiance" value="0.3, 0.3, 0.3"/></emitter>)"));
+  const auto path = renderBlocks(stage, stage.path(), {48, 160, 1});
+  const LightTracing tracing{1, PhotonEmission(stage.ready.lights)};
+  using Wrong = PathWithLight<WrongGuide, WrongGuide>;
+  const auto blocksOf = [&](float camera, float light) {
+    return renderBlocks(stage, Wrong(stage.ready, stage.camera, stage.options, tracing, {camera}, {light}),
+                        {48, 24, 1000});
+  };
+  CHECK(agree(path, blocksOf(1, 1)));
+  CHECK_FALSE(agree(path, blocksOf(1.2f, 1)));
+  CHECK_FALSE(agree(path, blocksOf(1, 1.2f)));
 }
 
 TEST_CASE("bidirectional: the density of a camera is the inverse of the area that a pixel covers") {

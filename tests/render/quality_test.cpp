@@ -3,7 +3,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "runtime/render/training/environment_guide.h"
+#include "runtime/render/lights/environment_guide.h"
 #include "tests/support/render_test_tools.h"
 #include "tests/support/studio.h"
 

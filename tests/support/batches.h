@@ -3,11 +3,39 @@
 // pixels is estimated from the repetitions, because a light path contributes to several pixels at once.
 
 #include "runtime/render/integrators/bidirectional_integrator.h"
+#include "runtime/render/integrators/bidirectional_paths.h"
 #include "runtime/render/integrators/renderer.h"
 #include "runtime/render/training/light_learning.h"
 #include "tests/support/agreement.h"
 
 namespace lobe::test {
+
+/// Path tracing with light paths. Both guides may be wrong, to test that this is detected.
+template <class CameraGuide = BsdfSampler, class LightGuide = BsdfSampler>
+class PathWithLight : public BidirectionalIntegrator {
+ public:
+  PathWithLight(const RenderScene& scene, const RayCamera& camera, const PathOptions& options,
+                const LightTracing& tracing, CameraGuide cameraGuide = {}, LightGuide lightGuide = {})
+      : scene_(scene),
+        camera_(camera),
+        options_(options),
+        tracing_(tracing),
+        cameraGuide_(cameraGuide),
+        lightGuide_(lightGuide) {}
+  Rgb radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
+               std::vector<Splat>& splats) const override {
+    return radianceWithLightPaths(scene_, camera_, options_, cameraGuide_, lightGuide_, tracing_, ray, rng, lightRng,
+                                  statistics, splats);
+  }
+
+ private:
+  const RenderScene& scene_;
+  const RayCamera& camera_;
+  PathOptions options_;
+  LightTracing tracing_;
+  CameraGuide cameraGuide_;
+  LightGuide lightGuide_;
+};
 
 /// A scene that is ready to be rendered, with a learnt choice of lights.
 struct Stage {
@@ -20,6 +48,9 @@ struct Stage {
 
   PathIntegrator path() const { return {ready, options}; }
   BdptIntegrator bdpt() const { return {ready, camera, options}; }
+  PathWithLight<> pathWithLight(double pathsPerPixel = 1) const {
+    return {ready, camera, options, {pathsPerPixel, PhotonEmission(ready.lights)}};
+  }
   /// radius: of merging, in world units, for all samples.
   VcmIntegrator vcm(float radius) const { return {ready, camera, options, {radius, 1}}; }
 

@@ -27,7 +27,7 @@ void LightImage::sumRows(std::span<const std::vector<Splat>> lists, int first, i
   const auto row = [&](int y) { return sums_.begin() + static_cast<std::ptrdiff_t>(y) * camera_.width(); };
   std::fill(row(first), row(last), Sum::Zero());
   const float radius = camera_.filter().radius();
-  const auto at = [](float y) { return Splat{Vec2(0.0f, y), Rgb::Zero()}; };
+  const auto at = [](float y) { return Splat{Vec2(0.0f, y), Rgb::Zero(), 0}; };
   for (const std::vector<Splat>& list : lists) {
     const auto begin = std::ranges::lower_bound(list, at(static_cast<float>(first) - radius), above);
     const auto end = std::ranges::upper_bound(list, at(static_cast<float>(last) + radius), above);

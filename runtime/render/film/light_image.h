@@ -14,6 +14,9 @@ namespace lobe {
 struct Splat {
   Vec2 film;
   Rgb value;
+  /// The sum over the other techniques of their squared densities relative to this one, from which the multiple
+  /// importance weight 1 / (1 + others) in the value follows.
+  double others = 0;
 };
 
 class LightImage {

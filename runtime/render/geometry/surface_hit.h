@@ -58,6 +58,12 @@ SurfaceHit makeSurfaceHit(const Scene& scene, const Ray& ray, const Hit& hit);
 /// differ, because the mapped normal may depend on the direction. The distance is kept.
 SurfaceHit asSeenFrom(const Scene& scene, const SurfaceHit& hit, const Vec3& direction);
 
+/// Whether two views of a surface point have the same shading frame, so that a delta component takes the same way in both
+/// directions.
+inline bool sameFrame(const SurfaceHit& a, const SurfaceHit& b) {
+  return a.frame.n.dot(b.frame.n) > 1.0f - 1e-5f;
+}
+
 /// The BSDF at the hit, with the shadowing term for bump mapping, a factor that depends on wi (local in hit.frame).
 /// Estimators must use these functions instead of those of hit.bsdf. hit.bsdf must not be null.
 Rgb evalBsdf(const SurfaceHit& hit, const Vec3& wi);

@@ -19,6 +19,12 @@ Rgb GuidedBdptIntegrator::radiance(const Ray& ray, Sampler& rng, Sampler& lightR
       .radiance(ray, rng, lightRng, statistics, splats);
 }
 
+Rgb GuidedLightIntegrator::radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
+                                    std::vector<Splat>& splats) const {
+  return radianceWithLightPaths(scene_, camera_, options_, guide_, BsdfSampler(), tracing_, ray, rng, lightRng,
+                                statistics, splats);
+}
+
 float MergeRadius::at(int sample) const {
   return first * std::pow(static_cast<float>(sample) + 1.0f, 0.5f * (alpha - 1.0f));
 }

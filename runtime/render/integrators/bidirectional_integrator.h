@@ -39,6 +39,24 @@ class GuidedBdptIntegrator : public BidirectionalIntegrator {
   const GuidedSampler& lightGuide_;
 };
 
+/// Guided path tracing whose camera paths are combined with light paths (light_tracing.h).
+class GuidedLightIntegrator : public BidirectionalIntegrator {
+ public:
+  /// Scene, camera and guide must outlive it, and what they refer to. Light paths are sampled by the BSDF.
+  GuidedLightIntegrator(const RenderScene& scene, const RayCamera& camera, const PathOptions& options,
+                        const GuidedSampler& guide, const LightTracing& tracing)
+      : scene_(scene), camera_(camera), options_(options), guide_(guide), tracing_(tracing) {}
+  Rgb radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
+               std::vector<Splat>& splats) const override;
+
+ private:
+  const RenderScene& scene_;
+  const RayCamera& camera_;
+  PathOptions options_;
+  const GuidedSampler& guide_;
+  LightTracing tracing_;
+};
+
 /// The radius of vertex merging: sample i of the image, counted from 0, has the radius first · (i + 1)^((alpha − 1)/2),
 /// with which the bias and the variance of the image both vanish if 0 < alpha < 1 (Knaus and Zwicker 2011, "Progressive
 /// Photon Mapping: A Probabilistic Approach").

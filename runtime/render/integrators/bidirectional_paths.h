@@ -11,12 +11,17 @@
 // Directions of both subpaths are sampled by guides, which path_loop.h defines. The densities in the weights are those
 // of the guides in both directions.
 //
+// Light tracing alone (traceLight) makes the light paths for light_tracing.h: their vertices are connected to the
+// camera only, and weighted against camera paths with next-event estimation that passes through surfaces
+// (RenderScene::arriving).
+//
 // Connections do not pass through surfaces that transmit light: what is behind glass is found by tracing rays. A point
 // or directional light behind glass is therefore not seen in a mirror.
 
 #include <deque>
 
 #include "runtime/render/film/light_image.h"
+#include "runtime/render/integrators/light_tracing.h"
 #include "runtime/render/integrators/partial_weights.h"
 #include "runtime/render/integrators/path_loop.h"
 #include "runtime/render/integrators/photon_grid.h"
@@ -40,6 +45,14 @@ class BidirectionalPaths {
     std::vector<Splat> none;
     Sample sample{lightRng, lightRng, statistics, none};
     sample.photons = &photons;
+    traceLightPath(sample);
+  }
+
+  /// Traces a light path for camera paths that are weighted by the same LightTracing.
+  void traceLight(const LightTracing& tracing, Sampler& lightRng, PathStatistics& statistics,
+                  std::vector<Splat>& splats) {
+    tracing_ = &tracing;
+    Sample sample{lightRng, lightRng, statistics, splats};
     traceLightPath(sample);
   }
 
@@ -83,9 +96,11 @@ class BidirectionalPaths {
     PartialWeights weights;
     LightSelection nextEvent = {};  // at the last vertex of a camera path
     int depth = 0;
-    float eta2 = 1;              // as in PathLoop; 1 on light paths
-    Rgb expected = Rgb::Ones();  // as in PathLoop
-    float start = 1;             // largest component of the first throughput
+    float eta2 = 1;                         // as in PathLoop; 1 on light paths
+    Rgb expected = Rgb::Ones();             // as in PathLoop
+    float start = 1;                        // largest component of the first throughput
+    const EmittedPhoton* photon = nullptr;  // at the start of a light path
+    LightPassage passage = {};              // of a light path
   };
 
   struct Sample {
@@ -99,7 +114,10 @@ class BidirectionalPaths {
     std::vector<Photon>* photons = nullptr;  // if set, the light path is only stored there
   };
 
-  double lightPaths() const { return static_cast<double>(camera_.width()) * camera_.height(); }
+  /// Light paths of a sample of the image.
+  double lightPaths() const {
+    return static_cast<double>(camera_.width()) * camera_.height() * (tracing_ ? tracing_->pathsPerPixel : 1.0);
+  }
 
   // ---- Light path
 
@@ -109,16 +127,15 @@ class BidirectionalPaths {
     const double choice = sample.lightRng.uniformDouble();
     const Vec2 u1 = sample.lightRng.uniform2();
     const Vec2 u2 = sample.lightRng.uniform2();
-    const std::optional<EmittedPhoton> photon = scene_.lights.samplePhoton(choice, u1, u2);
+    const std::optional<EmittedPhoton> photon =
+        tracing_ ? tracing_->emission.sample(choice, u1, u2) : scene_.lights.samplePhoton(choice, u1, u2);
     if (!photon || !(photon->density > 0.0f) || !(photon->power.maxCoeff() > 0.0f)) return;
     std::optional<SurfaceHit> hit = trace(sample, photon->ray);
     if (!hit) return;
-    // Next-event estimation at the first vertex has the same receiver as on a camera path, which arrives on the same
-    // side of a surface that only reflects.
-    const float nextEvent = scene_.lights.at(*hit).pdf(*photon, hit->distance);
     Walk walk{photon->ray, photon->power,
-              PartialWeights::fromLight(nextEvent, photon->density, photon->cosine(), photon->delta, merging_)};
+              PartialWeights::fromLight(1, photon->density, photon->cosine(), photon->delta, merging_)};
     walk.start = photon->power.maxCoeff();
+    walk.photon = &*photon;
     // The last segment of a path of maximum length is a connection.
     while (hit && ++walk.depth < options_.maxDepth && advanceLightPath(sample, walk, *hit))
       hit = trace(sample, walk.ray);
@@ -129,13 +146,28 @@ class BidirectionalPaths {
     const float delta = hit.bsdf->deltaProbability(hit.wo, hit.uv);
     const bool ends = walk.depth + 1 >= options_.maxDepth;
     if (delta >= 1.0f) return !ends && scatterDelta<Transport::flux>(sample, walk, hit, delta);
+    const PartialWeights weights = walk.passage.specular ? withNextEvent(walk, hit) : walk.weights;
     const LightVertex& vertex =
-        sample.lightPath.emplace_back(lightGuide_, hit, walk.throughput, walk.weights, walk.depth, 1.0f - delta);
+        sample.lightPath.emplace_back(lightGuide_, hit, walk.throughput, weights, walk.depth, 1.0f - delta);
     if (sample.photons)
-      sample.photons->push_back({hit.position, hit.normal, hit.woWorld, walk.throughput, walk.weights, walk.depth});
+      sample.photons->push_back({hit.position, hit.normal, hit.woWorld, walk.throughput, weights, walk.depth});
     else
       connectToCamera(sample, vertex);
     return !ends && scatter<Transport::flux>(sample, walk, vertex, delta);
+  }
+
+  /// The weights at a vertex up to which light has met delta components only. Next-event estimation there has the same
+  /// receiver as on a camera path, which arrives on the same side of a surface that only reflects.
+  PartialWeights withNextEvent(const Walk& walk, const SurfaceHit& hit) const {
+    PartialWeights weights = walk.weights;
+    if (walk.passage.found(walk.photon->far)) {
+      const LightSelection nextEvent = scene_.lights.at(hit);
+      weights.connect(walk.photon->light < 0 ? nextEvent.environmentPdf(hit.woWorld)
+                                             : nextEvent.pdf(*walk.photon, walk.passage.distance + hit.distance));
+    } else {
+      weights.disconnect();
+    }
+    return weights;
   }
 
   void connectToCamera(Sample& sample, const LightVertex& vertex) const {
@@ -152,7 +184,7 @@ class BidirectionalPaths {
         squared(density / lightPaths()) * vertex.weights.with(pdfFrom(cameraGuide_, seen, vertex.hit));
     const double weight = 1.0 / (1.0 + others);
     sample.splats.push_back(
-        {view->film, vertex.throughput * scattered * static_cast<float>(density * weight / lightPaths())});
+        {view->film, vertex.throughput * scattered * static_cast<float>(density * weight / lightPaths()), others});
   }
 
   // ---- Camera path
@@ -285,7 +317,8 @@ class BidirectionalPaths {
   static bool arrive(Walk& walk, const SurfaceHit& hit) {
     const float cosine = std::abs(hit.normal.dot(hit.woWorld));
     if (!hit.bsdf || !(cosine > 0.0f) || !sidesAgree(hit, hit.woWorld, hit.wo)) return false;
-    walk.weights.arrive(walk.depth == 1 ? 1.0f : hit.distance, cosine);
+    const bool first = walk.photon ? walk.passage.specular : walk.depth == 1;
+    walk.weights.arrive(first ? 1.0f : hit.distance, cosine);
     return true;
   }
 
@@ -302,10 +335,7 @@ class BidirectionalPaths {
   /// The density with which paths of a guide that arrive along seen.wo continue along hit.wo; both are the same point.
   template <class Guide>
   static float pdfFrom(const Guide& guide, const SurfaceHit& seen, const SurfaceHit& hit) {
-    if (!sidesAgree(seen, seen.woWorld, seen.wo)) return 0.0f;
-    const float smooth = 1.0f - seen.bsdf->deltaProbability(seen.wo, seen.uv);
-    if (smooth <= 0.0f) return 0.0f;
-    return smooth * typename Guide::Vertex(guide, seen).pdf(seen.frame.toLocal(hit.woWorld));
+    return reversePdf(guide, seen, hit);
   }
 
   /// Scatters a subpath; returns false if it ends.
@@ -321,8 +351,11 @@ class BidirectionalPaths {
     if (!sidesAgree(hit, direction, scattered->wi)) return false;
     const SurfaceHit seen = asSeenFrom(scene_.scene, hit, direction);
     const float cosine = std::abs(hit.normal.dot(direction));
+    walk.weights = vertex.weights;
     if constexpr (transport == Transport::flux) {
       walk.weights.scatter(pdf, pdfFrom(cameraGuide_, seen, hit), cosine);
+      if (tracing_) walk.weights.disconnect();
+      walk.passage.scatter();
       return continueAlong(walk, hit, direction, evalAdjointBsdf(hit, seen) * (cosine / pdf));
     } else {
       walk.weights.scatter(pdf, pdfFrom(lightGuide_, seen, hit), cosine);
@@ -345,9 +378,19 @@ class BidirectionalPaths {
       if (flux) return false;
       walk.weights.exclude();
     }
-    walk.weights.scatterDelta(std::abs(hit.normal.dot(hit.woWorld)), scattered->eta);
+    scatterDelta<transport>(walk, hit, *scattered);
     if (!flux) walk.eta2 *= squaredEta(scattered->eta);
     return continueAlong(walk, hit, direction, scattered->weight / fraction);
+  }
+
+  template <Transport transport>
+  void scatterDelta(Walk& walk, const SurfaceHit& hit, const DeltaSample& scattered) const {
+    const float arriving = std::abs(hit.normal.dot(hit.woWorld));
+    if constexpr (transport == Transport::flux) {
+      walk.passage.pass(hit, scattered.wi, tracing_ ? scene_.shadowSurfaces : 0);
+      if (walk.passage.specular) return walk.weights.pass(arriving, scattered.eta);
+    }
+    walk.weights.scatterDelta(arriving, scattered.eta);
   }
 
   static bool continueAlong(Walk& walk, const SurfaceHit& hit, const Vec3& direction, const Rgb& weight) {
@@ -362,7 +405,6 @@ class BidirectionalPaths {
     return transport == Transport::flux ? sample.lightRng : sample.rng;
   }
   static float squaredEta(float eta) { return eta * eta; }
-  static bool sameFrame(const SurfaceHit& a, const SurfaceHit& b) { return a.frame.n.dot(b.frame.n) > 1.0f - 1e-5f; }
 
   const RenderScene& scene_;
   const RayCamera& camera_;
@@ -370,7 +412,22 @@ class BidirectionalPaths {
   const CameraGuide& cameraGuide_;
   const LightGuide& lightGuide_;
   const PhotonGrid* photons_ = nullptr;
-  double merging_ = 0;  // PartialWeights::fromLight
+  double merging_ = 0;                     // PartialWeights::fromLight
+  const LightTracing* tracing_ = nullptr;  // light paths are connected to the camera only
 };
+
+/// A camera path of PathLoop and the light paths of its sample, see BidirectionalIntegrator. Their number is random,
+/// with the mean that `tracing` says.
+template <class CameraGuide, class LightGuide>
+Rgb radianceWithLightPaths(const RenderScene& scene, const RayCamera& camera, const PathOptions& options,
+                           const CameraGuide& cameraGuide, const LightGuide& lightGuide, const LightTracing& tracing,
+                           const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
+                           std::vector<Splat>& splats) {
+  BidirectionalPaths paths(scene, camera, options, cameraGuide, lightGuide);
+  for (double left = tracing.pathsPerPixel - lightRng.uniformDouble(); left > 0; left -= 1)
+    paths.traceLight(tracing, lightRng, statistics, splats);
+  return PathLoop(scene, options, cameraGuide, LightPaths(scene, camera, lightGuide, tracing))
+      .radiance(ray, rng, statistics);
+}
 
 }  // namespace lobe

@@ -50,12 +50,26 @@ class PartialWeights {
     vc_ *= squared(static_cast<double>(arriving) / squared(eta));
     vcm_ = 0.0;
   }
+  /// A delta component of a light subpath that next-event estimation passes, too, before the first `scatter`.
+  void pass(float arriving, float eta) {
+    const double scale = squared(static_cast<double>(arriving) / squared(eta));
+    vc_ *= scale;
+    vcm_ *= scale;
+  }
+  /// At the vertex of a light subpath up to which next-event estimation would follow the light: multiplies the density
+  /// `connection` of fromLight.
+  void connect(float density) { vcm_ *= squared(density); }
+  /// Excludes the connection of the last vertex to a vertex of the other subpath.
+  void disconnect() { vcm_ = 0.0; }
   /// Excludes all techniques that would make the subpath up to here from its other end.
   void exclude() { vc_ = 0.0; }
 
   /// The sum over the techniques in which this vertex, and perhaps more, belongs to the other subpath, divided by the
   /// squared density with which the other subpath samples this vertex. reverse: as in scatter, at this vertex.
   double with(float reverse) const { return merging_ + vcm_ + vc_ * squared(reverse); }
+
+  /// Whether `with` depends on its argument.
+  bool dependsOnReverse() const { return vc_ > 0.0; }
 
   /// The weight of merging this vertex of a camera path with one of a light path; reverse, lightReverse: as in `with`
   /// for either. Must not be called if vertices are not merged.

@@ -33,6 +33,7 @@
 
 #include "runtime/guiding/rendered_samples.h"
 #include "runtime/render/integrators/integrator.h"
+#include "runtime/render/integrators/light_tracing.h"
 #include "runtime/render/integrators/sample_counts.h"
 #include "runtime/render/lights/render_scene.h"
 
@@ -62,11 +63,12 @@ struct RecordDirection {
   Vec3 direction;        ///< unit, z > 0
 };
 
-template <class Guide>
+template <class Guide, class LightPaths = NoLightPaths>
 class PathLoop {
  public:
-  PathLoop(const RenderScene& scene, const PathOptions& options, const Guide& sampler)
-      : scene_(scene), options_(options), sampler_(sampler) {}
+  /// lightPaths: against which the camera paths are weighted (light_tracing.h).
+  PathLoop(const RenderScene& scene, const PathOptions& options, const Guide& sampler, LightPaths lightPaths = {})
+      : scene_(scene), options_(options), sampler_(sampler), lightPaths_(std::move(lightPaths)) {}
 
   Rgb radiance(const Ray& cameraRay, Sampler& rng, PathStatistics& statistics) const {
     Found found;
@@ -107,6 +109,7 @@ class PathLoop {
     Rgb radiance = Rgb::Zero();
     Rgb throughput = Rgb::Ones();
     EmissionWeight emissionWeight = {};
+    [[no_unique_address]] typename LightPaths::Weight lightTracing = {};
     Rgb expected = Rgb::Ones();  // product of the albedos: the expected throughput, whatever was sampled
     float eta2 = 1;              // scaling of radiance by refraction so far, which Russian roulette undoes
     int depth = 0;
@@ -127,13 +130,15 @@ class PathLoop {
     const std::optional<SurfaceHit> hit = trace(path);
     if (!hit) {
       if (dark) return false;
-      path.radiance +=
-          path.throughput * scene_.lights.environmentRadiance(path.ray.direction) * path.emissionWeight.ofEnvironment();
+      path.radiance += path.throughput * scene_.lights.environmentRadiance(path.ray.direction) *
+                       path.emissionWeight.ofEnvironment(lightPaths_.atEnvironment(path.lightTracing, path.ray));
       return false;
     }
     if (hit->emitter && !dark)
-      path.radiance += path.throughput * emittedRadiance(*hit) * path.emissionWeight.ofSurface(*hit);
+      path.radiance += path.throughput * emittedRadiance(*hit) *
+                       path.emissionWeight.ofSurface(*hit, lightPaths_.atLight(path.lightTracing, *hit));
     if (!hit->bsdf || path.depth >= options_.maxDepth || !sidesAgree(*hit, hit->woWorld, hit->wo)) return false;
+    lightPaths_.arrive(path.lightTracing, path.ray, *hit, path.depth);
     return scatter(path, *hit);
   }
 
@@ -268,7 +273,9 @@ class PathLoop {
     const ArrivingLight arriving = scene_.arriving(hit, *light, options_.maxDepth - path.depth - 1);
     path.statistics->shadowRays += static_cast<std::uint64_t>(arriving.rays);
     if (!(arriving.radiance.maxCoeff() > 0.0f)) return Rgb::Zero();
-    const float weight = light->delta ? 1.0f : misWeight(light->pdf, (1.0f - at.delta) * at.vertex.pdf(wi));
+    const float byChance = light->delta ? 0.0f : (1.0f - at.delta) * at.vertex.pdf(wi);
+    const float weight =
+        misWeight(light->pdf, byChance, lightPaths_.ofNextEvent(path.lightTracing, hit, *light, arriving));
     return f * arriving.radiance * (std::abs(wi.z()) * weight / light->pdf);
   }
 
@@ -284,6 +291,7 @@ class PathLoop {
       if (path.found)
         if (const std::optional<RecordDirection> in = at.vertex.inRecord(sample->wi))
           path.found->push_back({*in, in->direction.z() / pdf, path.throughput, path.radiance});
+    lightPaths_.scatter(path.lightTracing, hit, path.ray.direction, pdf);
     return true;
   }
 
@@ -307,7 +315,9 @@ class PathLoop {
     if (!sample) return false;
     path.emissionWeight.passed(hit, sample->wi, scene_.shadowSurfaces);
     path.eta2 *= sample->eta * sample->eta;
-    return continueAlong(path, hit, sample->wi, sample->weight / fraction);
+    if (!continueAlong(path, hit, sample->wi, sample->weight / fraction)) return false;
+    lightPaths_.scatterDelta(path.lightTracing, hit, path.ray.direction, sample->eta);
+    return true;
   }
 
   bool continueAlong(Path& path, const SurfaceHit& hit, const Vec3& wi, const Rgb& weight) const {
@@ -322,6 +332,7 @@ class PathLoop {
   const RenderScene& scene_;
   const PathOptions& options_;
   const Guide& sampler_;
+  [[no_unique_address]] LightPaths lightPaths_;
 };
 
 }  // namespace lobe

@@ -151,6 +151,9 @@ class Lights {
   /// The u for which photonFromEnvironment returns the photon that travels along −wi through a point of the scene.
   Vec2 photonCoordinates(const Vec3& point, const Vec3& wi) const;
 
+  /// The area of the disc on which photons from infinity start.
+  float discArea() const { return kPi * sphere_.radius * sphere_.radius; }
+
   const EnvironmentLight* environment() const { return environment_ ? &*environment_ : nullptr; }
   /// The probability with which samplePhoton chooses the environment.
   float environmentProbability() const {
@@ -187,7 +190,6 @@ class Lights {
     return scene_.lights[static_cast<std::size_t>(light) - areas_.size()];
   }
   bool isArea(int light) const { return static_cast<std::size_t>(light) < areas_.size(); }
-  float discArea() const { return kPi * sphere_.radius * sphere_.radius; }
 
   /// Lights that are chosen together: a node of the tree (node ≥ 0), a directional light (light ≥ 0), or a tile of the
   /// environment.

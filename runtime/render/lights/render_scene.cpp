@@ -9,6 +9,11 @@ bool anyTransmits(const Scene& scene) {
   return std::ranges::any_of(scene.materials, [](const Material& m) { return m.bsdf && m.bsdf->transmits(); });
 }
 
+/// Whether the surface is the same for light that arrives from the direction in which the ray leaves it.
+bool reversible(const Scene& scene, const SurfaceHit& hit, const Vec3& direction) {
+  return !hit.bsdf->mapsNormals() || sameFrame(hit, asSeenFrom(scene, hit, direction));
+}
+
 /// Segments end slightly before the light, so that they do not hit it.
 constexpr float kBeforeLight = 1.0f - 0x1p-18f;
 
@@ -69,6 +74,8 @@ TransmittedRay RenderScene::follow(Ray ray, int maxSurfaces, const Vec3* target)
     if (!sidesAgree(hit, direction, through->wi) || !(through->weight.maxCoeff() > 0)) return result;
     result.transmittance *= through->weight;
     result.bent = result.bent || !through->straight;
+    result.eta *= through->eta;
+    result.reversible = result.reversible && reversible(scene, hit, direction);
     ++result.surfaces;
     ray = spawnRay(hit, direction);
     if (target) {
@@ -99,6 +106,8 @@ ArrivingLight RenderScene::arriving(const SurfacePoint& from, const LightSample&
   }
   result.rays += end.surfaces;
   result.last = end.last;
+  result.eta = end.eta;
+  result.reversible = end.reversible;
   // A directional light is not found along a direction that was changed.
   if (!end.hit && !(end.bent && light.delta))
     result.radiance = end.transmittance * (end.bent ? lights.environmentRadiance(end.last.direction) : light.radiance);
@@ -107,6 +116,14 @@ ArrivingLight RenderScene::arriving(const SurfacePoint& from, const LightSample&
 
 std::optional<DeltaTransmission> sharedTransmission(const SurfaceHit& hit, const Vec3& wi) {
   return wi.z() * hit.wo.z() < 0 ? deltaTransmission(hit) : std::nullopt;
+}
+
+void LightPassage::pass(const SurfaceHit& hit, const Vec3& wi, int shadowSurfaces) {
+  if (!specular || !followed) return;
+  const std::optional<DeltaTransmission> through = sharedTransmission(hit, wi);
+  followed = through && ++surfaces <= shadowSurfaces;
+  bent = bent || !through || !through->straight;
+  distance += hit.distance;
 }
 
 void EmissionWeight::passed(const SurfaceHit& hit, const Vec3& wi, int shadowSurfaces) {

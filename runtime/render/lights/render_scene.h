@@ -14,6 +14,9 @@ struct TransmittedRay {
   Rgb transmittance = Rgb::Ones();
   int surfaces = 0;   ///< passed
   bool bent = false;  ///< at least one surface changed the direction
+  float eta = 1;      ///< index of refraction at its end over that at its origin
+  /// Whether light takes the same way in the other direction. It does not where a mapped normal depends on the viewer.
+  bool reversible = true;
 };
 
 /// Light that reaches a point from a light sample.
@@ -21,6 +24,8 @@ struct ArrivingLight {
   Rgb radiance = Rgb::Zero();  ///< for a delta light, its irradiance; zero if the light is blocked
   Ray last;                    ///< the last segment of the way to the light; unit direction
   int rays = 1;                ///< traced
+  float eta = 1;               ///< as in TransmittedRay
+  bool reversible = true;      ///< as in TransmittedRay
 };
 
 struct RenderScene {
@@ -58,14 +63,31 @@ struct RenderScene {
 };
 
 /// Multiple importance weight of a technique with density `own` against one with density `other` (power heuristic).
-inline float misWeight(float own, float other) {
+/// others: the sum over further techniques of their squared densities relative to `own`.
+inline float misWeight(float own, float other, float others = 0) {
   const float ratio = other / own;
-  return 1.0f / (1.0f + ratio * ratio);
+  return 1.0f / (1.0f + ratio * ratio + others);
 }
 
 /// The transmission that next-event estimation follows at a surface, if a path that continues in the direction wi
 /// (local in hit.frame) by a delta component follows it, too. nullopt: the path takes another way.
 std::optional<DeltaTransmission> sharedTransmission(const SurfaceHit& hit, const Vec3& wi);
+
+/// How light has come from its source to a surface, which decides whether next-event estimation finds the same way.
+struct LightPassage {
+  bool specular = true;  ///< it has met delta components only
+  bool followed = true;  ///< and next-event estimation would follow the same way
+  bool bent = false;     ///< at least one surface changed the direction
+  int surfaces = 0;      ///< passed
+  float distance = 0;    ///< from the light, up to the last surface
+
+  /// The light is scattered at a hit by a non-delta component.
+  void scatter() { specular = false; }
+  /// It continues by a delta component, in a direction that is local in hit.frame.
+  void pass(const SurfaceHit& hit, const Vec3& wi, int shadowSurfaces);
+  /// Whether next-event estimation at the next surface finds the way of light that comes from infinity or not.
+  bool found(bool far) const { return specular && followed && (far || !bent); }
+};
 
 /// The multiple importance weight of the emission that a path finds, against next-event estimation at the last vertex
 /// that scattered the path: there, next-event estimation samples the same direction, and follows the same delta
@@ -84,10 +106,13 @@ class EmissionWeight {
   /// The path continued by a delta component, in a direction that is local in hit.frame.
   void passed(const SurfaceHit& hit, const Vec3& wi, int shadowSurfaces);
 
-  float ofEnvironment() const { return pdf_ > 0 ? misWeight(pdf_, nextEvent_.environmentPdf(direction_)) : 1.0f; }
+  /// others: as for misWeight.
+  float ofEnvironment(float others = 0) const {
+    return pdf_ > 0 ? misWeight(pdf_, nextEvent_.environmentPdf(direction_), others) : 1.0f / (1.0f + others);
+  }
   /// hit: on an area light.
-  float ofSurface(const SurfaceHit& hit) const {
-    return pdf_ > 0 && !bent_ ? misWeight(pdf_, nextEvent_.pdf(hit)) : 1.0f;
+  float ofSurface(const SurfaceHit& hit, float others = 0) const {
+    return pdf_ > 0 && !bent_ ? misWeight(pdf_, nextEvent_.pdf(hit), others) : 1.0f / (1.0f + others);
   }
 
  private:

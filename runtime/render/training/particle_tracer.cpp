@@ -44,7 +44,7 @@ ParticleTracer::ParticleTracer(const RenderScene& scene, const RayCamera& camera
       camera_(camera),
       radiance_(radiance),
       importance_(importance),
-      guide_(guide),
+      emission_(scene.lights, guide),
       seed_(seed ^ kTrainingSeed) {}
 
 ImportonResult ParticleTracer::traceImportons(int pass, int count, const ImportonWishes& wishes) const {
@@ -73,15 +73,9 @@ PhotonResult ParticleTracer::tracePhotons(int pass, int count) const {
 }
 
 std::optional<EmittedPhoton> ParticleTracer::emit(Sampler& rng) const {
-  const double environment = guide_ ? scene_.lights.environmentProbability() : 0.0;
   const double choice = rng.uniformDouble();
   const Vec2 u1 = rng.uniform2();
-  const Vec2 u2 = rng.uniform2();
-  // The environment is the last light: choices below 1 − environment select other lights.
-  if (choice < 1 - environment) return scene_.lights.samplePhoton(choice, u1, u2);
-  std::optional<EmittedPhoton> photon = guide_->sample((choice - (1 - environment)) / environment, u1, u2);
-  if (photon) photon->power /= static_cast<float>(environment);
-  return photon;
+  return emission_.sample(choice, u1, rng.uniform2());
 }
 
 }  // namespace lobe

@@ -26,7 +26,7 @@ class ParticleTracer {
   const RayCamera& camera_;
   const GuidedSampler& radiance_;
   const GuidedSampler& importance_;
-  const EnvironmentGuide* guide_;
+  PhotonEmission emission_;
   std::uint64_t seed_;
 };
 

@@ -57,25 +57,22 @@ void PhotonWalk::branchOff(Branch branch, const SurfaceHit& hit, const GuidedSam
   }
 }
 
-PhotonWalk::Passage PhotonWalk::passageAfter(const Branch& branch, const SurfaceHit& hit,
-                                             const Scattered& scattered) const {
-  Passage passage = branch.passage;
-  passage.specular = passage.specular && scattered.pdf == 0;
-  if (!passage.specular || !passage.followed) return passage;
-  const std::optional<DeltaTransmission> through = sharedTransmission(hit, scattered.wi);
-  passage.followed = through && ++passage.surfaces <= scene_.shadowSurfaces;
-  passage.bent = passage.bent || !through || !through->straight;
-  passage.distance += hit.distance;
+LightPassage PhotonWalk::passageAfter(const Branch& branch, const SurfaceHit& hit, const Scattered& scattered) const {
+  LightPassage passage = branch.passage;
+  if (scattered.pdf > 0)
+    passage.scatter();
+  else
+    passage.pass(hit, scattered.wi, scene_.shadowSurfaces);
   return passage;
 }
 
 /// The fraction of a photon's light that next-event estimation leaves to BSDF sampling: the multiple importance weight
 /// of BSDF sampling, for which cosθ/π replaces the density that is not yet known. Zero for delta lights, which BSDF
 /// sampling does not find.
-float PhotonWalk::directFraction(const EmittedPhoton& photon, const Passage& passage, const SurfaceHit& hit) const {
+float PhotonWalk::directFraction(const EmittedPhoton& photon, const LightPassage& passage, const SurfaceHit& hit) const {
   if (!passage.specular) return 1;
   if (photon.delta) return 0;
-  if (!passage.followed || (passage.bent && !photon.far)) return 1;
+  if (!passage.found(photon.far)) return 1;
   const LightSelection nextEvent = scene_.lights.at(hit);
   float emitter = 0;
   if (photon.far) {
@@ -91,7 +88,7 @@ float PhotonWalk::directFraction(const EmittedPhoton& photon, const Passage& pas
 }
 
 void PhotonWalk::store(const EmittedPhoton& photon, const Branch& branch, const SurfaceHit& hit) {
-  const Passage& passage = branch.passage;
+  const LightPassage& passage = branch.passage;
   const bool straight = passage.specular && passage.followed && !passage.bent;
   const float flux = luminance(branch.state.weight);
   const float weight = flux * directFraction(photon, passage, hit);

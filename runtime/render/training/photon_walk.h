@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "lobe/sample_storage.h"
-#include "runtime/render/training/environment_guide.h"
+#include "runtime/render/lights/environment_guide.h"
 #include "runtime/render/training/particle_state.h"
 
 namespace lobe {
@@ -27,21 +27,13 @@ class PhotonWalk {
   void run(const EmittedPhoton& photon, std::uint64_t index, int photons = 1);
 
  private:
-  /// How a photon came here from its light, while it has met delta components only.
-  struct Passage {
-    bool specular = true;  ///< met delta components only
-    bool followed = true;  ///< and next-event estimation would follow the same way
-    bool bent = false;
-    int surfaces = 0;
-    float distance = 0;  ///< from the light
-  };
   struct Branch {
     ParticleState state;
     int depth;
-    Passage passage = {};
+    LightPassage passage = {};
   };
-  Passage passageAfter(const Branch& branch, const SurfaceHit& hit, const Scattered& scattered) const;
-  float directFraction(const EmittedPhoton& photon, const Passage& passage, const SurfaceHit& hit) const;
+  LightPassage passageAfter(const Branch& branch, const SurfaceHit& hit, const Scattered& scattered) const;
+  float directFraction(const EmittedPhoton& photon, const LightPassage& passage, const SurfaceHit& hit) const;
   void advance(const EmittedPhoton& photon, const Branch& branch);
   /// Scatters the branches that leave a surface; for vertex see scatter().
   void branchOff(Branch branch, const SurfaceHit& hit, const GuidedSampler::Vertex* vertex);

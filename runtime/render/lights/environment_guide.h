@@ -28,6 +28,8 @@ class EnvironmentGuide {
   /// Samples a photon from the environment; its power is not divided by the probability of choosing the environment.
   /// nullopt: a photon of zero power.
   std::optional<EmittedPhoton> sample(double choice, const Vec2& u1, const Vec2& u2) const;
+  /// EmittedPhoton::density with which sample finds the photon that travels along −wi through the point.
+  float density(const Vec3& point, const Vec3& wi) const;
 
  private:
   static constexpr int kBlockColumns = 64, kBlockRows = 32;

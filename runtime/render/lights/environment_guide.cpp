@@ -1,4 +1,4 @@
-#include "runtime/render/training/environment_guide.h"
+#include "runtime/render/lights/environment_guide.h"
 
 namespace lobe {
 
@@ -70,6 +70,17 @@ std::optional<EmittedPhoton> EnvironmentGuide::sample(double choice, const Vec2&
   const float pdf = choice_.probability(chosen) * kCells * kCells * from->pdf;
   if (!(pdf > 0)) return std::nullopt;
   return lights_.photonFromEnvironment({from->wi, from->radiance, pdf}, u);
+}
+
+float EnvironmentGuide::density(const Vec3& point, const Vec3& wi) const {
+  if (!(choice_.total() > 0)) return environment_.pdf(wi) / lights_.discArea();
+  const int index = blockOf(wi);
+  const Vec2 u = lights_.photonCoordinates(point, wi);
+  const auto bin = static_cast<std::size_t>(index) * kCells * kCells + static_cast<std::size_t>(cellOf(u));
+  const PixelBlock pixels = block(index);
+  if (!(weights_[bin] > 0) || environment_.blockWeight(pixels) <= 0) return 0;
+  const double probability = weights_[bin] / choice_.total();
+  return static_cast<float>(probability) * kCells * kCells * environment_.pdf(pixels, wi) / lights_.discArea();
 }
 
 }  // namespace lobe
