@@ -121,9 +121,27 @@ ImageAttributes common(const std::vector<Part>& parts) {
   return result;
 }
 
-ImageAttributes mergedAttributes(const std::vector<Part>& parts) {
+/// The fraction of the light that a limit of samples has cut off (the attribute fireflyCut), for the parts together;
+/// nullopt if no part has one. sums: of the pixels of each part.
+std::optional<double> cutFraction(const std::vector<Part>& parts, const std::vector<double>& sums) {
+  double cut = 0, all = 0;
+  bool any = false;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const std::optional<double> fraction = find<double>(parts[i].attributes, "fireflyCut");
+    const double kept = parts[i].samples * sums[i];
+    const double before = kept / (1 - std::clamp(fraction.value_or(0), 0.0, 1 - 1e-9));
+    any = any || fraction;
+    cut += before - kept;
+    all += before;
+  }
+  if (!any) return std::nullopt;
+  return all > 0 ? cut / all : 0;
+}
+
+ImageAttributes mergedAttributes(const std::vector<Part>& parts, const std::vector<double>& sums) {
   ImageAttributes attributes = common(parts);
   for (const char* ofOne : {"sampleOffset", "sampleRanges", "seconds"}) attributes.erase(ofOne);
+  if (const std::optional<double> cut = cutFraction(parts, sums)) attributes["fireflyCut"] = *cut;
   double samples = 0;
   std::vector<SampleRange> ranges;
   for (const Part& part : parts) {
@@ -140,7 +158,8 @@ ImageAttributes mergedAttributes(const std::vector<Part>& parts) {
   return attributes;
 }
 
-Image weightedMean(const std::vector<Part>& parts) {
+/// sums: receives the sums of the luminances of each part.
+Image weightedMean(const std::vector<Part>& parts, std::vector<double>& sums) {
   Image result;
   std::vector<Eigen::Array3d> sum;
   double samples = 0;
@@ -155,6 +174,8 @@ Image weightedMean(const std::vector<Part>& parts) {
                                            image.height, parts.front().path.string(), result.width, result.height));
     for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += part.samples * image.pixels[i].cast<double>();
     samples += part.samples;
+    sums.push_back(0);
+    for (const Rgb& pixel : image.pixels) sums.back() += luminance(pixel);
   }
   for (std::size_t i = 0; i < sum.size(); ++i) result.pixels[i] = (sum[i] / samples).cast<float>();
   return result;
@@ -178,7 +199,9 @@ MergedImage mergeImages(std::span<const std::filesystem::path> paths) {
     checkSameScene(parts.front(), parts.back());
     for (std::size_t i = 0; i + 1 < parts.size(); ++i) checkDisjoint(parts[i], parts.back());
   }
-  return {weightedMean(parts), mergedAttributes(parts)};
+  std::vector<double> sums;
+  Image image = weightedMean(parts, sums);
+  return {std::move(image), mergedAttributes(parts, sums)};
 }
 
 }  // namespace lobe

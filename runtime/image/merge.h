@@ -30,10 +30,11 @@ struct MergedImage {
 };
 
 /// The mean of the images weighted by their samples per pixel. Attributes that all images have in common are kept, and
-/// samples is the sum. The ranges are stored as seed and sampleOffset if they form one range, otherwise as
-/// sampleRanges, so that a merged image can be merged again. Throws std::runtime_error that names the file or files if
-/// an image does not record its number of samples, sizes or scenes differ, or two images contain samples of the same
-/// range.
+/// samples is the sum. fireflyCut is combined; if
+/// parts have different limits, fireflyLimit is dropped as any attribute that differs. The ranges are stored as seed
+/// and sampleOffset if they form one range, otherwise as sampleRanges, so that a merged image can be merged again.
+/// Throws std::runtime_error that names the file or files if an image does not record its number of samples, sizes or
+/// scenes differ, or two images contain samples of the same range.
 MergedImage mergeImages(std::span<const std::filesystem::path> paths);
 
 }  // namespace lobe

@@ -27,6 +27,8 @@ auto countersOf(Statistics& statistics) {
                                                &statistics.refits};
   for (auto& count : statistics.strategies) all.push_back(&count);
   for (auto& count : statistics.decisions) all.push_back(&count);
+  for (auto& key : statistics.largest.keys) all.push_back(&key);
+  all.push_back(&statistics.cut.units);
   return all;
 }
 

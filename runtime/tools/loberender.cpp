@@ -171,6 +171,11 @@ void declare(CLI::App& app, Options& options) {
                  "Number of glass, mask or null surfaces that next-event estimation sees through (0: none)")
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();
+  app.add_option(
+         "--firefly-limit", job.fireflyLimit,
+         "Limit the luminance of the indirect light in a sample of a pixel; the picture is then biased, and its "
+         "metadata say how much light was cut off (default: no limit)")
+      ->type_name("LUMINANCE");
   app.add_option("--sampler", job.sampling, "Random numbers of a pixel: Owen-scrambled Sobol' points, or independent")
       ->transform(oneOf(kSamplerNames))
       ->default_str("sobol");

@@ -84,6 +84,8 @@ void RenderJob::validate() const {
           "--gradients cannot be combined with --checkpoint and --resume, because a checkpoint holds no gradients");
   require(merge.first > 0 && std::isfinite(merge.first), "--merge-radius must be a finite number greater than 0");
   require(merge.alpha > 0 && merge.alpha <= 1, "--merge-alpha must be greater than 0 and at most 1");
+  require(!fireflyLimit || (*fireflyLimit > 0 && std::isfinite(*fireflyLimit)),
+          "--firefly-limit must be a finite number greater than 0");
   require(!snapshotEvery || (*snapshotEvery >= 0 && std::isfinite(*snapshotEvery)),
           "--snapshot-every must be a finite number of at least 0");
   require(resume.empty() || !record, "--record cannot be combined with --resume, because the particles are not stored");

@@ -57,6 +57,7 @@ struct RenderJob {
   int shadowSurfaces = RenderScene::kDefaultShadowSurfaces;
   PixelSampling sampling = PixelSampling::sobol;
   RussianRoulette russianRoulette = RussianRoulette::efficiency;
+  std::optional<float> fireflyLimit;  ///< PathOptions::fireflyLimit
   std::uint64_t seed = 1;
   float reduction = 0;  ///< maximum cost of merging the mixtures of both factors (Runnalls 2007); 0: no merging
   TrainingPlan training;

@@ -1,9 +1,12 @@
 #include "runtime/tools/render_report.h"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <numeric>
 #include <stdexcept>
+#include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -60,6 +63,31 @@ nlohmann::ordered_json asJson(const std::optional<LightPathTrial>& trial, bool u
           {"cost_with_light_paths", trial->costWithLight}};
 }
 
+/// In descending order.
+nlohmann::ordered_json asJson(const LargestContributions& largest) {
+  std::vector<LargestContributions::Key> keys(largest.keys.begin(), largest.keys.end());
+  std::erase(keys, LargestContributions::Key{0});
+  std::ranges::sort(keys, std::greater<>());
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const LargestContributions::Key key : keys) {
+    const PathKind kind = LargestContributions::kindOf(key);
+    list.push_back({{"luminance", LargestContributions::luminanceOf(key)},
+                    {"technique", kTechniqueNames[static_cast<std::size_t>(kind.technique)]},
+                    {"segments", kind.segments},
+                    {"delta_at_light", kind.deltaAtLight}});
+  }
+  return list;
+}
+
+/// The light that --firefly-limit has cut off, as a fraction of the sum of the picture without the limit.
+double cutFraction(const RenderJob& job, const RunResult& run) {
+  const double cut = run.render.statistics.cut.times(*job.fireflyLimit);
+  double sum = cut;
+  for (const Film::Pixel& pixel : run.film.pixels())
+    sum += luminance(Eigen::Map<const Eigen::Array3d>(pixel.sum).cast<float>());
+  return sum > 0 ? cut / sum : 0;
+}
+
 }  // namespace
 
 nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, const RunResult& run) {
@@ -98,6 +126,8 @@ nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, c
           {"lobe_bytes", run.guiding.caches ? run.guiding.caches->bytes() : 0},
           {"strategy_fractions", fractionsOf(paths.strategies, kScatteringNames)},
           {"guiding_decisions", fractionsOf(paths.decisions, kGuidingDecisionNames)},
+          {"firefly_cut_fraction", job.fireflyLimit ? nlohmann::ordered_json(cutFraction(job, run)) : nullptr},
+          {"largest_contributions", asJson(paths.largest)},
           {"nonfinite_samples", run.film.dropped()}};
 }
 
@@ -112,6 +142,10 @@ ImageAttributes attributes(const RenderJob& job, std::uint64_t sceneHash, const 
     all["samples"] = static_cast<double>(least);
   else  // without "samples", so that such a picture is not merged as if all pixels had equally many
     all["interrupted"] = fmt::format("{} to {} samples per pixel", least, most);
+  if (job.fireflyLimit) {
+    all["fireflyLimit"] = static_cast<double>(*job.fireflyLimit);
+    all["fireflyCut"] = cutFraction(job, run);
+  }
   if (run.guiding.usesLightPaths) all["lightPathsPerPixel"] = run.guiding.lightPaths->pathsPerPixel;
   if (run.guiding.caches) all["cacheHashes"] = fmt::format("{:016x}", fmt::join(run.guiding.caches->hashes(), " "));
   if (job.gradients)

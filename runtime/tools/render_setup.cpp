@@ -41,6 +41,7 @@ PathOptions pathOptions(const RenderJob& job, const Scene& scene) {
   PathOptions options;
   if (const std::optional<int> depth = job.maxDepth ? job.maxDepth : scene.maxDepth) options.maxDepth = *depth;
   options.emitterVisibility = scene.emitterVisibility;
+  if (job.fireflyLimit) options.fireflyLimit = *job.fireflyLimit;
   return options;
 }
 
@@ -48,9 +49,9 @@ PathOptions pathOptions(const RenderJob& job, const Scene& scene) {
 std::unique_ptr<BidirectionalIntegrator> makeWithLightPaths(const RenderJob& job, const RenderScene& scene,
                                                             const RayCamera& camera, const PathOptions& options,
                                                             Guiding& guiding) {
-  // Light paths must be better by this factor, because the trial is not exact.
-  constexpr double kGain = 0.9;
-  constexpr double kPaths = 100000;
+  // The inefficiency must fall to this fraction: most pixels have no outliers and lose the time of the light paths.
+  constexpr double kGain = 0.5;
+  constexpr double kPaths = 50000;
   if (job.lightPaths == LightPathUse::off || scene.lights.empty()) return nullptr;
   const Stopwatch watch;
   const int paths = static_cast<int>(kPaths * preparationSize(job));
@@ -149,6 +150,7 @@ RunSettings settingsOf(const RenderJob& job, const Scene& scene, const Guiding& 
                   {"--sample-offset", std::to_string(job.sampleOffset)},
                   {"--max-depth", job.maxDepth ? std::to_string(*job.maxDepth) : "that of the scene"},
                   {"--shadow-surfaces", std::to_string(job.shadowSurfaces)},
+                  {"--firefly-limit", job.fireflyLimit ? fmt::format("{}", *job.fireflyLimit) : "none"},
                   {"the hash of scene and camera", fmt::format("{:016x}", pictureHash(scene))}};
   if (job.integrator == IntegratorKind::bdpt) all.emplace_back("--guide", nameOf(job.guide));
   if (job.integrator == IntegratorKind::vcm) {

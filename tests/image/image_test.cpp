@@ -103,6 +103,47 @@ TEST_CASE("render: metrics can leave out a fraction of the worst pixels") {
   CHECK(m.relmseDrop1 == 0);
 }
 
+TEST_CASE("render: the standard error of the mean error is that between blocks") {
+  Image reference(kErrorBlock * 4, kErrorBlock, grey(0.0f)), image = reference;
+  // Relative errors of 100, 200, 300 and 400 in the four blocks.
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) {
+      const auto block = static_cast<float>(x / kErrorBlock + 1);
+      image.at(x, y) = grey(std::sqrt(block));
+    }
+  const ErrorMetrics m = compareImages(reference, image);
+  CHECK(m.relmse == Approx(250));
+  // The standard deviation of 100, 200, 300 and 400, over the root of 4.
+  CHECK(m.relmseError == Approx(std::sqrt(50000.0 / 3) / 2));
+  CHECK(std::isnan(compareImages(Image(kErrorBlock, 2), Image(kErrorBlock, 2)).relmseError));
+}
+
+TEST_CASE("render: metrics say what fraction of the error the worst pixels have") {
+  Image reference(100, 100, grey(0.0f)), image = reference;
+  for (int i = 0; i < 200; ++i) image.pixels[static_cast<std::size_t>(i) * 47] = grey(0.1f);  // an error of 1 each
+  image.pixels[5] = grey(1);                                                                  // an error of 100
+  const ErrorMetrics m = compareImages(reference, image);
+  CHECK(m.worst.fraction001 == Approx(100.0 / 300));
+  CHECK(m.worst.fraction01 == Approx((100.0 + 9) / 300));
+  CHECK(m.worst.fraction1 == Approx((100.0 + 99) / 300));
+  CHECK(compareImages(reference, reference).worst.fraction1 == 0);
+}
+
+TEST_CASE("render: fireflies are far above their surroundings and the reference") {
+  Image reference(20, 20, grey(0.5f));
+  reference.at(3, 3) = grey(20);  // a small lamp
+  Image image = reference;
+  CHECK(compareImages(reference, image).fireflies == 0);
+  image.at(10, 10) = grey(5.1f);
+  image.at(0, 19) = grey(7);
+  image.at(15, 5) = grey(4.9f);  // less than ten times
+  CHECK(compareImages(reference, image).fireflies == 2);
+  // A bright area is an error, but none of single pixels.
+  for (int y = 0; y < 10; ++y)
+    for (int x = 0; x < 20; ++x) image.at(x, y) = grey(6);
+  CHECK(compareImages(reference, image).fireflies == 2);
+}
+
 TEST_CASE("render: images are read back from files") {
   const Folder folder;
   const Image image = gradient(13, 7);

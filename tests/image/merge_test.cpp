@@ -94,6 +94,23 @@ TEST_CASE("render: merging keeps attributes that all images have in common excep
   CHECK(attributes == ImageAttributes{{"samples", 8.0}, {"software", "x"}});
 }
 
+TEST_CASE("render: merging combines the fractions of light that a limit has cut off") {
+  // Of 3 and 9 samples; 1/3 and 1/5 of the light are cut off. The third picture has no limit.
+  ImageAttributes first = madeOf("path", 1, 0, 3), second = madeOf("path", 1, 3, 9);
+  first["fireflyLimit"] = second["fireflyLimit"] = 2.0;
+  first["fireflyCut"] = 1.0 / 3, second["fireflyCut"] = 1.0 / 5;
+  Pictures p;
+  p.add(2, first);
+  p.add(4, second);
+  const ImageAttributes both = mergeImages(p.paths).attributes;
+  CHECK(std::get<double>(both.at("fireflyLimit")) == 2);
+  CHECK(std::get<double>(both.at("fireflyCut")) == Approx((3 * 1 + 9 * 1) / (3 * 3.0 + 9 * 5)));
+  p.add(1, madeOf("path", 1, 12, 6));
+  const ImageAttributes all = mergeImages(p.paths).attributes;
+  CHECK(all.count("fireflyLimit") == 0);
+  CHECK(std::get<double>(all.at("fireflyCut")) == Approx((3 * 1 + 9 * 1) / (3 * 3.0 + 9 * 5 + 6)));
+}
+
 TEST_CASE("render: errors name the images that cannot be merged") {
   Pictures sizes;
   sizes.add(1, madeOf("path", 1, 0, 4));

@@ -37,8 +37,13 @@ TEST_CASE("render: lobecompare prints error metrics as text and JSON") {
     CHECK(json[0]["relmse_drop_1pct"].get<double>() == Approx(0.01 / 0.26));
     CHECK(json[0]["mean_ratio"].get<double>() == Approx(1.2));
     CHECK(json[0]["nonfinite"] == 0);
+    CHECK(json[0]["relmse_error"].get<double>() < 1e-6);
+    CHECK(json[0]["worst_0.01pct_fraction"].get<double>() == Approx(0.01));
+    CHECK(json[0]["worst_1pct_fraction"].get<double>() == Approx(0.01));
+    CHECK(json[0]["fireflies"] == 0);
     CHECK(json[1]["mse"] == 0);
     CHECK(lobecompare(reference + " " + image).out.find("0.01") != std::string::npos);
+    CHECK(lobecompare(reference + " " + image).out.find("fireflies") != std::string::npos);
   }
   SECTION("map") {
     const std::string map = folder / "map.png";

@@ -13,7 +13,7 @@
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
-#include "runtime/image/image.h"
+#include "runtime/image/image_output.h"
 #include "schema/lobe_cache.h"
 #include "tests/support/loberender_test_tools.h"
 
@@ -164,6 +164,8 @@ TEST_CASE("loberender: invalid command lines are errors") {
       {" --spp 1 -o a.exr", "a.exr"},
       {" --spp 1 --stats scene.xml", "scene.xml"},
       {" --spp 1 --guide magic", "--guide"},
+      {" --spp 1 --light-paths maybe", "auto, on, off"},
+      {" --spp 1 --firefly-limit 0", "--firefly-limit"},
       {" --spp 1 --integrator vcm --merge-radius 0", "--merge-radius"},
       {" --spp 1 --integrator vcm --merge-alpha 1.5", "--merge-alpha"},
       {" --spp 1 --integrator vcm --save-illumination a.illum", "bdpt with --guide"},
@@ -263,6 +265,65 @@ TEST_CASE("loberender: pictures from gradients do not depend on the number of th
   CHECK(file.header().typedAttribute<Imf::StringAttribute>("gradients").value().substr(0, 2) == norm);
   CHECK(number(file.header(), "clampedFraction") >= 0);
   CHECK(number(file.header(), "clampedFraction") < 0.1);
+}
+
+TEST_CASE("loberender: pictures with light paths do not depend on the number of threads, and parts make the whole") {
+  const SceneFolder folder(true);
+  const std::string integrator = GENERATE("guided", "product");
+  const std::string render = "loberender scene.xml --light-paths on --seed 9 --integrator " + integrator + kTraining;
+  for (const std::string threads : {"1", "2", "7"})
+    REQUIRE(folder.run(render + " --spp 4 --stats s.json --threads " + threads + " -o " + threads + ".exr").code == 0);
+  CHECK(folder.bytes("1.exr") == folder.bytes("2.exr"));
+  CHECK(folder.bytes("1.exr") == folder.bytes("7.exr"));
+  const auto s = nlohmann::json::parse(folder.bytes("s.json"));
+  CHECK(s.at("integrator") == integrator);
+  CHECK(s.at("light_paths").at("used") == true);
+  CHECK(s.at("light_paths").at("paths_per_pixel") > 0);
+  CHECK(s.at("nonfinite_samples") == 0);
+  const auto& largest = s.at("largest_contributions");
+  REQUIRE(largest.size() > 10);
+  CHECK(largest[0].at("luminance") >= largest[1].at("luminance"));
+  CHECK(std::ranges::any_of(largest, [](const auto& c) { return c.at("technique") == "next_event"; }));
+
+  REQUIRE(folder.run(render + " --spp 2 -o a.exr").code == 0);
+  REQUIRE(folder.run(render + " --spp 2 --sample-offset 2 -o b.exr").code == 0);
+  REQUIRE(runBinary(folder.path(), "lobecompare --merge merged.exr a.exr b.exr").code == 0);
+  const Image whole = readImage(folder / "1.exr"), merged = readImage(folder / "merged.exr");
+  for (std::size_t i = 0; i < whole.pixels.size(); ++i)
+    CHECK((whole.pixels[i] - merged.pixels[i]).abs().maxCoeff() < 1e-5f * (1 + whole.pixels[i].maxCoeff()));
+  CHECK(folder.run("loberender scene.xml --integrator path --spp 1 -o a.exr --light-paths on")
+            .error.find("--integrator path ignores --light-paths") != std::string::npos);
+}
+
+TEST_CASE("loberender: pictures say how much light --firefly-limit has cut off, and so do merged ones") {
+  const SceneFolder folder(true);
+  const std::string integrator = GENERATE("path", "product --light-paths on", "bdpt", "vcm");
+  const bool trained = integrator.starts_with("product");
+  const std::string render =
+      "loberender scene.xml --seed 3 --integrator " + integrator + (trained ? kTraining : std::string());
+  const auto cutOf = [&](const std::string& name) {
+    return std::get<double>(readAttributes(folder / name).at("fireflyCut"));
+  };
+  const auto sumOf = [&](const std::string& name) {
+    double sum = 0;
+    for (const Rgb& pixel : readImage(folder / name).pixels) sum += luminance(pixel);
+    return sum;
+  };
+  REQUIRE(folder.run(render + " --spp 4 -o plain.exr").code == 0);
+  CHECK(readAttributes(folder / "plain.exr").count("fireflyCut") == 0);
+  const std::string limited = render + " --firefly-limit 0.05";
+  REQUIRE(folder.run(limited + " --spp 4 -o whole.exr --stats s.json").code == 0);
+  CHECK(std::get<double>(readAttributes(folder / "whole.exr").at("fireflyLimit")) == Approx(0.05));
+  CHECK(cutOf("whole.exr") > 0.01);
+  CHECK(nlohmann::json::parse(folder.bytes("s.json")).at("firefly_cut_fraction") == cutOf("whole.exr"));
+  // The filter spreads light paths over the border of the picture.
+  CHECK(sumOf("whole.exr") / (1 - cutOf("whole.exr")) ==
+        Approx(sumOf("plain.exr")).epsilon(integrator == "path" ? 1e-4 : 0.02));
+
+  REQUIRE(folder.run(limited + " --spp 1 -o a.exr").code == 0);
+  REQUIRE(folder.run(limited + " --spp 3 --sample-offset 1 -o b.exr").code == 0);
+  REQUIRE(runBinary(folder.path(), "lobecompare --merge merged.exr a.exr b.exr").code == 0);
+  CHECK(cutOf("merged.exr") == Approx(cutOf("whole.exr")).epsilon(1e-4));
 }
 
 TEST_CASE("loberender: statistics and convergence and images of a run") {

@@ -276,9 +276,10 @@ TEST_CASE("loberender: a second interruption ends at once") {
 TEST_CASE("loberender: a resumed render has the bytes of an uninterrupted one") {
   const SceneFolder folder(true);
   for (const std::string integrator :
-       {"path", "bdpt", "vcm --merge-radius 0.05", "guided", "product", "bdpt --guide illumination"}) {
+       {"path --firefly-limit 0.2", "bdpt", "vcm --merge-radius 0.05", "guided", "product", "bdpt --guide illumination",
+        "product --light-paths on --firefly-limit 0.2"}) {
     const bool trained =
-        integrator.ends_with("guided") || integrator.ends_with("product") || integrator.ends_with("illumination");
+        integrator.find("guide") != std::string::npos || integrator.find("product") != std::string::npos;
     const std::string render =
         "loberender scene.xml --size 32x24 --integrator " + integrator + (trained ? kTraining : "");
     REQUIRE(folder.run(render + " --spp 6 -o whole.exr --stats whole.json").code == 0);
@@ -291,7 +292,8 @@ TEST_CASE("loberender: a resumed render has the bytes of an uninterrupted one") 
     CHECK(folder.bytes("part.exr") == folder.bytes("whole.exr"));
     const auto whole = nlohmann::json::parse(folder.bytes("whole.json")),
                part = nlohmann::json::parse(folder.bytes("part.json"));
-    for (const char* key : {"rays", "spp", "training_particles", "records", "strategy_fractions", "guiding_decisions"})
+    for (const char* key : {"rays", "spp", "training_particles", "records", "strategy_fractions", "guiding_decisions",
+                            "largest_contributions", "firefly_cut_fraction"})
       CHECK(whole[key] == part[key]);
     CHECK(folder.run(render + " --spp 6 -o again.exr --resume run.ckpt").code == 0);
     CHECK(folder.bytes("again.exr") == folder.bytes("whole.exr"));
@@ -315,6 +317,8 @@ TEST_CASE("loberender: a checkpoint of another run is refused") {
            {" --sampler independent", "--sampler was sobol"},
            {" --max-depth 3", "--max-depth was"},
            {" --reduction 0.1", "--reduction was 0"},
+           {" --light-paths on", "--light-paths was auto, and is on now"},
+           {" --firefly-limit 2", "--firefly-limit was none, and is 2 now"},
            {" --components 4", "--components was 8"}})
     CHECK_THAT(refusal(render + options), Contains("run.ckpt: a checkpoint of another run: ") && Contains(what));
   for (const auto& [was, now] : std::vector<std::pair<std::string, std::string>>{

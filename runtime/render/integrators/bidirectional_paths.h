@@ -63,32 +63,10 @@ class BidirectionalPaths {
     ++statistics.paths;
     traceLightPath(sample);
     traceCameraPath(sample, cameraRay);
-    return sample.radiance;
+    return sample.found.limited(options_.fireflyLimit, statistics.cut);
   }
 
  private:
-  /// A vertex with a non-delta component. throughput: without the BSDF at this vertex; on light paths the flux.
-  template <class Guide>
-  struct Vertex {
-    Vertex(const Guide& guide, const SurfaceHit& h, const Rgb& weight, const PartialWeights& partial, int segments,
-           float fraction)
-        : hit(h), throughput(weight), weights(partial), depth(segments), smooth(fraction), sampler(guide, hit) {}
-    Vertex(const Vertex&) = delete;
-    Vertex& operator=(const Vertex&) = delete;
-
-    /// The density with which the subpath continues in a direction (world space).
-    float pdf(const Vec3& direction) const { return smooth * sampler.pdf(hit.frame.toLocal(direction)); }
-
-    SurfaceHit hit;
-    Rgb throughput;
-    PartialWeights weights;
-    int depth;     // segments from the origin of the subpath
-    float smooth;  // probability of sampling the non-delta component
-    typename Guide::Vertex sampler;
-  };
-  using CameraVertex = Vertex<CameraGuide>;
-  using LightVertex = Vertex<LightGuide>;
-
   /// A subpath that is being traced.
   struct Walk {
     Ray ray;
@@ -100,15 +78,44 @@ class BidirectionalPaths {
     Rgb expected = Rgb::Ones();             // as in PathLoop
     float start = 1;                        // largest component of the first throughput
     const EmittedPhoton* photon = nullptr;  // at the start of a light path
-    LightPassage passage = {};              // of a light path
+    bool delta = false;         // the vertex next to the light, as far as it is known, scatters by a delta component
+    LightPassage passage = {};  // of a light path
   };
+
+  /// A vertex with a non-delta component. throughput: without the BSDF at this vertex; on light paths the flux.
+  template <class Guide>
+  struct Vertex {
+    Vertex(const Guide& guide, const SurfaceHit& h, const Walk& walk, const PartialWeights& partial, float fraction)
+        : hit(h),
+          throughput(walk.throughput),
+          weights(partial),
+          depth(walk.depth),
+          smooth(fraction),
+          delta(walk.delta),
+          sampler(guide, hit) {}
+    Vertex(const Vertex&) = delete;
+    Vertex& operator=(const Vertex&) = delete;
+
+    /// The density with which the subpath continues in a direction (world space).
+    float pdf(const Vec3& direction) const { return smooth * sampler.pdf(hit.frame.toLocal(direction)); }
+
+    SurfaceHit hit;
+    Rgb throughput;
+    PartialWeights weights;
+    int depth;     // segments from the origin of the subpath
+    float smooth;  // probability of sampling the non-delta component
+    bool delta;    // Walk::delta
+    typename Guide::Vertex sampler;
+  };
+  using CameraVertex = Vertex<CameraGuide>;
+  using LightVertex = Vertex<LightGuide>;
 
   struct Sample {
     Sampler& rng;
     Sampler& lightRng;  // of the light path, so that the stratified numbers are left to the camera path
     PathStatistics& statistics;
     std::vector<Splat>& splats;
-    Rgb radiance = Rgb::Zero();
+    FoundLight found = {};
     Vec2 lens = Vec2::Zero();  // point of the lens to which the light path is connected
     std::deque<LightVertex> lightPath = {};
     std::vector<Photon>* photons = nullptr;  // if set, the light path is only stored there
@@ -147,10 +154,10 @@ class BidirectionalPaths {
     const bool ends = walk.depth + 1 >= options_.maxDepth;
     if (delta >= 1.0f) return !ends && scatterDelta<Transport::flux>(sample, walk, hit, delta);
     const PartialWeights weights = walk.passage.specular ? withNextEvent(walk, hit) : walk.weights;
-    const LightVertex& vertex =
-        sample.lightPath.emplace_back(lightGuide_, hit, walk.throughput, weights, walk.depth, 1.0f - delta);
+    const LightVertex& vertex = sample.lightPath.emplace_back(lightGuide_, hit, walk, weights, 1.0f - delta);
     if (sample.photons)
-      sample.photons->push_back({hit.position, hit.normal, hit.woWorld, walk.throughput, weights, walk.depth});
+      sample.photons->push_back(
+          {hit.position, hit.normal, hit.woWorld, walk.throughput, weights, walk.depth, walk.delta});
     else
       connectToCamera(sample, vertex);
     return !ends && scatter<Transport::flux>(sample, walk, vertex, delta);
@@ -183,8 +190,11 @@ class BidirectionalPaths {
     const double others =
         squared(density / lightPaths()) * vertex.weights.with(pdfFrom(cameraGuide_, seen, vertex.hit));
     const double weight = 1.0 / (1.0 + others);
+    const Rgb value = vertex.throughput * scattered * static_cast<float>(density * weight / lightPaths());
+    const PathKind kind{Technique::lightTracing, vertex.depth + 1, vertex.delta};
+    sample.statistics.largest.add(luminance(value), kind);
     sample.splats.push_back(
-        {view->film, vertex.throughput * scattered * static_cast<float>(density * weight / lightPaths()), others});
+        {view->film, FoundLight::limited(value, kind.segments, options_.fireflyLimit, sample.statistics.cut), others});
   }
 
   // ---- Camera path
@@ -193,10 +203,10 @@ class BidirectionalPaths {
     const bool dark = options_.emitterVisibility != EmitterVisibility::shown;
     std::optional<SurfaceHit> hit = scene_.firstVisible(ray, options_.emitterVisibility, sample.statistics.segments);
     if (!hit) {
-      if (!dark) sample.radiance += scene_.lights.environmentRadiance(ray.direction);
+      if (!dark) contribute(sample, scene_.lights.environmentRadiance(ray.direction), {Technique::emission, 1, false});
       return;
     }
-    if (!dark) sample.radiance += emittedRadiance(*hit);
+    if (!dark) contribute(sample, emittedRadiance(*hit), {Technique::emission, 1, false});
     Walk walk{ray, Rgb::Ones(),
               PartialWeights::fromCamera(camera_.density(ray, hit->distance), lightPaths(), merging_)};
     while (hit && ++walk.depth < options_.maxDepth && advanceCameraPath(sample, walk, *hit)) {
@@ -210,7 +220,7 @@ class BidirectionalPaths {
     walk.nextEvent = scene_.lights.at(hit);
     const float delta = hit.bsdf->deltaProbability(hit.wo, hit.uv);
     if (delta >= 1.0f) return scatterDelta<Transport::radiance>(sample, walk, hit, delta);
-    const CameraVertex vertex(cameraGuide_, hit, walk.throughput, walk.weights, walk.depth, 1.0f - delta);
+    const CameraVertex vertex(cameraGuide_, hit, walk, walk.weights, 1.0f - delta);
     addDirectLight(sample, vertex, walk.nextEvent);
     for (const LightVertex& light : sample.lightPath) {
       if (walk.depth + light.depth >= options_.maxDepth) break;
@@ -231,7 +241,8 @@ class BidirectionalPaths {
         hit ? walk.weights.atLight(walk.nextEvent.pdf(*hit), lights.photonDensity(*hit), hit->normal.dot(hit->woWorld))
             : walk.weights.atLight(walk.nextEvent.environmentPdf(direction), lights.environmentPhotonDensity(direction),
                                    1.0f);
-    sample.radiance += walk.throughput * emitted * static_cast<float>(1.0 / (1.0 + others));
+    contribute(sample, walk.throughput * emitted * static_cast<float>(1.0 / (1.0 + others)),
+               {Technique::emission, walk.depth + 1, walk.delta});
   }
 
   /// Next-event estimation: connects to a point that is sampled on a light.
@@ -247,8 +258,9 @@ class BidirectionalPaths {
     ++sample.statistics.shadowRays;
     if (!scene_.visible(hit, *light)) return;
     const double weight = 1.0 / (1.0 + othersOfDirectLight(vertex, *light));
-    sample.radiance +=
-        vertex.throughput * f * light->radiance * static_cast<float>(std::abs(wi.z()) * weight / light->pdf);
+    contribute(sample,
+               vertex.throughput * f * light->radiance * static_cast<float>(std::abs(wi.z()) * weight / light->pdf),
+               {Technique::nextEvent, vertex.depth + 1, false});
   }
 
   /// The sum over all other techniques of their squared densities, relative to next-event estimation.
@@ -286,8 +298,10 @@ class BidirectionalPaths {
     const double others =
         squared(vertex.pdf(direction) * toLight) * light.weights.with(pdfFrom(cameraGuide_, seen, light.hit)) +
         squared(light.pdf(-direction) * toCamera) * vertex.weights.with(pdfFrom(lightGuide_, fromLight, vertex.hit));
-    sample.radiance += vertex.throughput * light.throughput * f * scattered *
-                       static_cast<float>(std::abs(wi.z()) * toLight / (1.0 + others));
+    contribute(sample,
+               vertex.throughput * light.throughput * f * scattered *
+                   static_cast<float>(std::abs(wi.z()) * toLight / (1.0 + others)),
+               {Technique::connection, vertex.depth + light.depth + 1, light.delta});
   }
 
   void merge(Sample& sample, const CameraVertex& vertex, const Photon& photon) const {
@@ -302,11 +316,17 @@ class BidirectionalPaths {
         vertex.weights.ofMerging(pdfFrom(lightGuide_, seen, hit), photon.weights, vertex.pdf(photon.direction));
     // The density of photons over area contains the cosine to the geometric normal where they arrived.
     const float cosine = std::abs(photon.normal.dot(photon.direction));
-    sample.radiance +=
-        vertex.throughput * f * photon.flux * static_cast<float>(std::abs(wi.z()) / cosine * weight / merging_);
+    contribute(sample,
+               vertex.throughput * f * photon.flux * static_cast<float>(std::abs(wi.z()) / cosine * weight / merging_),
+               {Technique::merging, vertex.depth + photon.depth, photon.delta});
   }
 
   // ---- Both
+
+  static void contribute(Sample& sample, const Rgb& value, const PathKind& kind) {
+    sample.found.add(value, kind.segments);
+    sample.statistics.largest.add(luminance(value), kind);
+  }
 
   std::optional<SurfaceHit> trace(Sample& sample, const Ray& ray) const {
     ++sample.statistics.segments;
@@ -352,6 +372,7 @@ class BidirectionalPaths {
     const SurfaceHit seen = asSeenFrom(scene_.scene, hit, direction);
     const float cosine = std::abs(hit.normal.dot(direction));
     walk.weights = vertex.weights;
+    rememberDelta<transport>(walk, false);
     if constexpr (transport == Transport::flux) {
       walk.weights.scatter(pdf, pdfFrom(cameraGuide_, seen, hit), cosine);
       if (tracing_) walk.weights.disconnect();
@@ -367,6 +388,7 @@ class BidirectionalPaths {
   template <Transport transport>
   bool scatterDelta(Sample& sample, Walk& walk, const SurfaceHit& hit, float fraction) const {
     sample.statistics.countDelta();
+    rememberDelta<transport>(walk, true);
     constexpr bool flux = transport == Transport::flux;
     const float choice = rngOf<transport>(sample).uniform();
     const std::optional<DeltaSample> scattered = flux ? sampleAdjointDelta(hit, choice) : sampleDelta(hit, choice);
@@ -381,6 +403,11 @@ class BidirectionalPaths {
     scatterDelta<transport>(walk, hit, *scattered);
     if (!flux) walk.eta2 *= squaredEta(scattered->eta);
     return continueAlong(walk, hit, direction, scattered->weight / fraction);
+  }
+
+  template <Transport transport>
+  static void rememberDelta(Walk& walk, bool delta) {
+    if (transport == Transport::radiance || walk.depth == 1) walk.delta = delta;
   }
 
   template <Transport transport>

@@ -8,6 +8,7 @@
 #include "runtime/core/sampler.h"
 #include "runtime/render/film/light_image.h"
 #include "runtime/render/geometry/ray.h"
+#include "runtime/render/integrators/contributions.h"
 #include "runtime/render/integrators/photon_grid.h"
 
 namespace lobe {
@@ -31,6 +32,8 @@ struct PathStatistics {
   std::uint64_t refits = 0;      ///< number of times that the picture's samples have changed the guiding
   std::array<std::uint64_t, kScatteringNames.size()> strategies{};
   std::array<std::uint64_t, kGuidingDecisionNames.size()> decisions{};
+  LargestContributions largest;
+  CutLight cut;  ///< by PathOptions::fireflyLimit
 
   void count(Strategy strategy) { ++strategies[static_cast<std::size_t>(strategy)]; }
   void countDelta() { ++strategies.back(); }
@@ -52,6 +55,8 @@ struct PathStatistics {
     refits += other.refits;
     for (std::size_t i = 0; i < strategies.size(); ++i) strategies[i] += other.strategies[i];
     for (std::size_t i = 0; i < decisions.size(); ++i) decisions[i] += other.decisions[i];
+    largest.add(other.largest);
+    cut.add(other.cut);
     return *this;
   }
 };

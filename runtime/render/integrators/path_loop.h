@@ -49,6 +49,9 @@ struct PathOptions {
   /// Where paths add the incident radiance that they find, as long as it is open. Null: nowhere.
   RenderedSamples* rendered = nullptr;
   EmitterVisibility emitterVisibility = EmitterVisibility::shown;
+  /// Limits the luminance of the indirect light of a sample (FoundLight), and that of every contribution of a light
+  /// path that is connected to the camera, > 0. The picture is biased if it is finite.
+  float fireflyLimit = std::numeric_limits<float>::infinity();
 };
 
 /// Upper bound of the survival probability once Russian roulette applies, so that every path ends.
@@ -71,25 +74,25 @@ class PathLoop {
       : scene_(scene), options_(options), sampler_(sampler), lightPaths_(std::move(lightPaths)) {}
 
   Rgb radiance(const Ray& cameraRay, Sampler& rng, PathStatistics& statistics) const {
-    Found found;
+    Continuations continuations;
     Path path{cameraRay, &rng, &statistics};
-    if (options_.rendered && options_.rendered->open()) path.found = &found;
+    if (options_.rendered && options_.rendered->open()) path.continuations = &continuations;
     ++statistics.paths;
     follow(path);
-    addFound(path, 0);
-    return path.radiance;
+    addIncident(path, 0);
+    return path.found.limited(options_.fireflyLimit, statistics.cut);
   }
 
   /// Traces a path without counts, and appends it to the log.
   void log(const Ray& cameraRay, Sampler& rng, PathLog& log) const {
     PathStatistics statistics;
-    Found found;
+    Continuations continuations;
     Path path{cameraRay, &rng, &statistics};
     path.log = &log;
-    if (options_.rendered && options_.rendered->open()) path.found = &found;
+    if (options_.rendered && options_.rendered->open()) path.continuations = &continuations;
     follow(path);
-    addFound(path, 0);
-    log.paths.push_back({log.vertices.size(), luminance(path.radiance), static_cast<float>(statistics.cost())});
+    addIncident(path, 0);
+    log.paths.push_back({log.vertices.size(), luminance(path.found.total()), static_cast<float>(statistics.cost())});
   }
 
  private:
@@ -100,23 +103,24 @@ class PathLoop {
     Rgb throughput;      // of the path that continues
     Rgb radianceBefore;  // found by the path before it continued
   };
-  using Found = std::vector<Continuation>;  // of a path and those that it has branched off from, in order
+  using Continuations = std::vector<Continuation>;  // of a path and those that it has branched off from, in order
 
   struct Path {
     Ray ray;
     Sampler* rng;
     PathStatistics* statistics;
-    Rgb radiance = Rgb::Zero();
+    FoundLight found = {};
     Rgb throughput = Rgb::Ones();
     EmissionWeight emissionWeight = {};
     [[no_unique_address]] typename LightPaths::Weight lightTracing = {};
     Rgb expected = Rgb::Ones();  // product of the albedos: the expected throughput, whatever was sampled
     float eta2 = 1;              // scaling of radiance by refraction so far, which Russian roulette undoes
     int depth = 0;
+    bool delta = false;   // the last scattering was by a delta component
     float reference = 0;  // SampleCountModel::reference; 0: no vertex had an estimate yet
     float branches = 1;   // expected number into which the camera path has been split so far
     PathLog* log = nullptr;
-    Found* found = nullptr;  // null: not wanted
+    Continuations* continuations = nullptr;  // null: not wanted
   };
 
   void follow(Path& path) const {
@@ -130,16 +134,27 @@ class PathLoop {
     const std::optional<SurfaceHit> hit = trace(path);
     if (!hit) {
       if (dark) return false;
-      path.radiance += path.throughput * scene_.lights.environmentRadiance(path.ray.direction) *
-                       path.emissionWeight.ofEnvironment(lightPaths_.atEnvironment(path.lightTracing, path.ray));
+      const float weight = path.emissionWeight.ofEnvironment(lightPaths_.atEnvironment(path.lightTracing, path.ray));
+      contribute(path, path.throughput * scene_.lights.environmentRadiance(path.ray.direction) * weight);
       return false;
     }
-    if (hit->emitter && !dark)
-      path.radiance += path.throughput * emittedRadiance(*hit) *
-                       path.emissionWeight.ofSurface(*hit, lightPaths_.atLight(path.lightTracing, *hit));
+    if (hit->emitter && !dark) {
+      const float weight = path.emissionWeight.ofSurface(*hit, lightPaths_.atLight(path.lightTracing, *hit));
+      contribute(path, path.throughput * emittedRadiance(*hit) * weight);
+    }
     if (!hit->bsdf || path.depth >= options_.maxDepth || !sidesAgree(*hit, hit->woWorld, hit->wo)) return false;
     lightPaths_.arrive(path.lightTracing, path.ray, *hit, path.depth);
     return scatter(path, *hit);
+  }
+
+  // Emission that the path has found.
+  static void contribute(Path& path, const Rgb& value) {
+    contribute(path, value, {Technique::emission, path.depth, path.delta});
+  }
+
+  static void contribute(Path& path, const Rgb& value, const PathKind& kind) {
+    path.found.add(value, kind.segments);
+    path.statistics->largest.add(luminance(value), kind);
   }
 
   std::optional<SurfaceHit> trace(const Path& path) const {
@@ -211,13 +226,13 @@ class PathLoop {
     const float throughput = luminance(path.throughput);
     if (!estimate || !(throughput * estimate->reflectedRadiance > 0)) return false;
     path.log->vertices.push_back(
-        {*estimate, throughput, luminance(path.radiance), 0, static_cast<float>(path.statistics->cost()), 0});
+        {*estimate, throughput, luminance(path.found.total()), 0, static_cast<float>(path.statistics->cost()), 0});
     return true;
   }
 
   void logDirect(Path& path) const {
     PathLog::Vertex& vertex = path.log->vertices.back();
-    vertex.radianceDirect = luminance(path.radiance);
+    vertex.radianceDirect = luminance(path.found.total());
     vertex.costDirect = static_cast<float>(path.statistics->cost());
   }
 
@@ -232,11 +247,11 @@ class PathLoop {
       Sampler rng = path.rng->branch();
       Path branch = path;
       branch.rng = &rng;
-      branch.radiance = Rgb::Zero();
-      const std::size_t first = path.found ? path.found->size() : 0;
+      branch.found = {};
+      const std::size_t first = path.continuations ? path.continuations->size() : 0;
       if (scatterAt(branch, at)) follow(branch);
-      addFound(branch, first);
-      path.radiance += branch.radiance;
+      addIncident(branch, first);
+      path.found.add(branch.found);
     }
     return scatterAt(path, at);
   }
@@ -251,36 +266,36 @@ class PathLoop {
     constexpr int kNumbersOfDirectLight = 3;
     const int samples = rounded(count, *path.rng);
     if (samples == 0) path.rng->skip(kNumbersOfDirectLight);
-    Rgb sum = Rgb::Zero();
-    if (samples > 0) sum += directLight(path, at, *path.rng);
+    if (samples > 0) addDirectLight(path, at, *path.rng, count);
     for (int i = 1; i < samples; ++i) {
       Sampler rng = path.rng->branch();
-      sum += directLight(path, at, rng);
+      addDirectLight(path, at, rng, count);
     }
-    path.radiance += path.throughput * sum / count;
   }
 
-  // One sample of next-event estimation: the light that is scattered at the vertex, without the path's throughput.
-  Rgb directLight(const Path& path, const Scattering& at, Sampler& rng) const {
+  // One of `count` samples of next-event estimation.
+  void addDirectLight(Path& path, const Scattering& at, Sampler& rng, float count) const {
     const SurfaceHit& hit = at.hit;
     const double choice = rng.stratifiedDouble();
     const std::optional<LightSample> light = at.lights.sample(choice, rng.stratified2());
-    if (!light) return Rgb::Zero();
+    if (!light) return;
     const Vec3 wi = hit.frame.toLocal(light->wi);
-    if (!sidesAgree(hit, light->wi, wi)) return Rgb::Zero();
+    if (!sidesAgree(hit, light->wi, wi)) return;
     const Rgb f = evalBsdf(hit, wi);
-    if (!(f.maxCoeff() > 0.0f)) return Rgb::Zero();
+    if (!(f.maxCoeff() > 0.0f)) return;
     const ArrivingLight arriving = scene_.arriving(hit, *light, options_.maxDepth - path.depth - 1);
     path.statistics->shadowRays += static_cast<std::uint64_t>(arriving.rays);
-    if (!(arriving.radiance.maxCoeff() > 0.0f)) return Rgb::Zero();
+    if (!(arriving.radiance.maxCoeff() > 0.0f)) return;
     const float byChance = light->delta ? 0.0f : (1.0f - at.delta) * at.vertex.pdf(wi);
     const float weight =
         misWeight(light->pdf, byChance, lightPaths_.ofNextEvent(path.lightTracing, hit, *light, arriving));
-    return f * arriving.radiance * (std::abs(wi.z()) * weight / light->pdf);
+    contribute(path, path.throughput * f * arriving.radiance * (std::abs(wi.z()) * weight / (light->pdf * count)),
+               {Technique::nextEvent, path.depth + arriving.rays, arriving.rays > 1});
   }
 
   bool scatterSmooth(Path& path, const Scattering& at) const {
     const SurfaceHit& hit = at.hit;
+    path.delta = false;
     const std::optional<BsdfSample> sample = at.vertex.sample(*path.rng, *path.statistics);
     if (!sample) return false;
     const float pdf = (1.0f - at.delta) * sample->pdf;
@@ -288,29 +303,30 @@ class PathLoop {
     if (!continueAlong(path, hit, sample->wi, sample->f * (std::abs(sample->wi.z()) / pdf))) return false;
     path.emissionWeight.scattered(at.lights, path.ray.direction, pdf);
     if constexpr (requires { at.vertex.inRecord(sample->wi); })
-      if (path.found)
+      if (path.continuations)
         if (const std::optional<RecordDirection> in = at.vertex.inRecord(sample->wi))
-          path.found->push_back({*in, in->direction.z() / pdf, path.throughput, path.radiance});
+          path.continuations->push_back({*in, in->direction.z() / pdf, path.throughput, path.found.total()});
     lightPaths_.scatter(path.lightTracing, hit, path.ray.direction, pdf);
     return true;
   }
 
   // Adds the incident radiance of the continuations from the given index on, which are those of this path, and removes
   // them. Emission that they have found is weighted against next-event estimation, whose part is left out.
-  void addFound(const Path& path, std::size_t first) const {
-    if (!path.found) return;
-    for (std::size_t i = first; i < path.found->size(); ++i) {
-      const Continuation& c = (*path.found)[i];
-      const Rgb light = path.radiance - c.radianceBefore;
+  void addIncident(const Path& path, std::size_t first) const {
+    if (!path.continuations) return;
+    for (std::size_t i = first; i < path.continuations->size(); ++i) {
+      const Continuation& c = (*path.continuations)[i];
+      const Rgb light = path.found.total() - c.radianceBefore;
       const float incident = luminance((c.throughput > 0).select(light / c.throughput, Rgb::Zero()));
       if (incident > 0)
         options_.rendered->add(c.at.record, toDisc(c.at.direction), incident * c.cosineOverPdf, path.rng->uniform());
     }
-    path.found->resize(first);
+    path.continuations->resize(first);
   }
 
   bool scatterDelta(Path& path, const SurfaceHit& hit, float fraction) const {
     path.statistics->countDelta();
+    path.delta = true;
     const std::optional<DeltaSample> sample = sampleDelta(hit, path.rng->uniform());
     if (!sample) return false;
     path.emissionWeight.passed(hit, sample->wi, scene_.shadowSurfaces);

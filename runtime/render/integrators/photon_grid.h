@@ -18,7 +18,8 @@ struct Photon {
   Vec3 direction;  ///< unit, from which the light came
   Rgb flux;
   PartialWeights weights;
-  int depth;  ///< segments from the light
+  int depth;   ///< segments from the light
+  bool delta;  ///< whether the vertex next to the light scatters by a delta component
 };
 
 class PhotonGrid {

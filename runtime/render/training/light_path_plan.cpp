@@ -18,6 +18,9 @@ namespace {
 constexpr std::uint64_t kTag = 0x6c69676874747279;
 constexpr int kChunk = 1024;
 constexpr std::array kPathsPerPixel{0.125, 0.25, 0.5, 1.0};
+// The fewest light paths are used whose inefficiency is at most this times the least. Most pixels have no outliers:
+// light paths cost them time and hardly help them.
+constexpr double kTolerance = 2;
 // Camera paths with light paths take this much longer, because of the densities in the weights.
 constexpr double kWeightingCost = 1.1;
 // Errors of pixels that are darker than this fraction of the median count less.
@@ -59,15 +62,21 @@ struct Chunk {
   std::vector<Splat> splats;
 };
 
-/// The squared value of the pixels of each block.
-std::vector<double> squaredValues(const std::vector<Chunk>& chunks, std::size_t blocks) {
-  std::vector<double> sums(blocks), counts(blocks);
+/// The values of the pixels of each block, and their squares, bounded from below.
+struct BlockValues {
+  std::vector<double> means, squares;
+};
+
+BlockValues valuesOf(const std::vector<Chunk>& chunks, std::size_t blocks) {
+  BlockValues values{std::vector<double>(blocks), std::vector<double>(blocks)};
+  std::vector<double> counts(blocks);
   for (const Chunk& chunk : chunks)
-    for (const CameraSample& sample : chunk.samples) sums[sample.block] += sample.radiance, counts[sample.block] += 1;
-  for (std::size_t i = 0; i < blocks; ++i) sums[i] = counts[i] > 0 ? sums[i] / counts[i] : 0;
-  const double dark = kDark * median(sums);
-  for (double& value : sums) value = value * value + dark * dark;
-  return sums;
+    for (const CameraSample& sample : chunk.samples)
+      values.means[sample.block] += sample.radiance, counts[sample.block] += 1;
+  for (std::size_t i = 0; i < blocks; ++i) values.means[i] /= std::max(1.0, counts[i]);
+  const double dark = kDark * median(values.means);
+  std::ranges::transform(values.means, values.squares.begin(), [&](double m) { return m * m + dark * dark; });
+  return values;
 }
 
 /// The mean without the largest values.
@@ -77,6 +86,54 @@ double trimmedMean(std::vector<double> values) {
       1, values.size() - static_cast<std::size_t>(kOutliers * static_cast<double>(values.size())));
   return std::accumulate(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(kept), 0.0) /
          static_cast<double>(kept);
+}
+
+/// Traces equally many camera paths and light paths, one per pixel.
+std::vector<Chunk> trace(const RenderScene& scene, const RayCamera& camera, const PathOptions& options,
+                         const GuidedSampler& guide, const LightTracing& tracing, const Blocks& blocks, int paths,
+                         std::uint64_t seed) {
+  const BsdfSampler lightGuide;
+  std::vector<Chunk> chunks((paths + kChunk - 1) / kChunk);
+  parallelFor(std::size_t{0}, chunks.size(), [&](std::size_t c) {
+    Chunk& chunk = chunks[c];
+    const PathLoop loop(scene, options, guide);
+    BidirectionalPaths light(scene, camera, options, guide, lightGuide);
+    const int first = static_cast<int>(c) * kChunk;
+    for (int i = first; i < std::min(paths, first + kChunk); ++i) {
+      Sampler rng(seed ^ kTag, 0, i), lightRng(seed ^ kTag, 1, i);
+      const Vec2 pixel = rng.uniform2();
+      const Vec2 film(pixel.x() * static_cast<float>(camera.width()), pixel.y() * static_cast<float>(camera.height()));
+      const Ray ray = camera.sample(static_cast<int>(film.x()), static_cast<int>(film.y()), rng);
+      chunk.samples.push_back({blocks.at(film), luminance(loop.radiance(ray, rng, chunk.camera))});
+      light.traceLight(tracing, lightRng, chunk.light, chunk.splats);
+    }
+  });
+  return chunks;
+}
+
+double trimmedVariance(const std::vector<Chunk>& chunks, const BlockValues& values) {
+  std::vector<double> deviations;
+  for (const Chunk& chunk : chunks)
+    for (const CameraSample& sample : chunk.samples) {
+      const double square = values.squares[sample.block];
+      deviations.push_back(square > 0 ? squared(sample.radiance - values.means[sample.block]) / square : 0);
+    }
+  return trimmedMean(std::move(deviations));
+}
+
+/// Adds the moments of a contribution, made with one light path per pixel, to a trial with another number. scale: the
+/// squared value of the pixel, times what makes sums of light paths means over pixels.
+void addMoments(LightPathTrial& trial, const Splat& splat, double pixels, double scale) {
+  // Of a single light path, without weights.
+  const double whole = luminance(splat.value) * pixels * (1.0 + splat.others);
+  if (!(whole > 0) || !(scale > 0)) return;
+  const double count = trial.pathsPerPixel * pixels;
+  // Light that camera paths cannot find at all would have an infinite second moment.
+  const double others = std::max(splat.others / squared(trial.pathsPerPixel), kLeastOthers);
+  const double weight = 1 / (1 + others);
+  const double moment = squared(whole) / (count * std::sqrt(others)) / scale;
+  trial.secondMoment += moment;
+  trial.left += moment * squared(others * weight) + squared(whole * weight) / count / scale;
 }
 
 }  // namespace
@@ -104,61 +161,27 @@ EnvironmentGuide learnEnvironmentGuide(const RenderScene& scene, const RayCamera
 LightPathTrial tryLightPaths(const RenderScene& scene, const RayCamera& camera, const PathOptions& options,
                              const GuidedSampler& guide, const PhotonEmission& emission, int paths,
                              std::uint64_t seed) {
-  const BsdfSampler lightGuide;
+  PathOptions unlimited = options;
+  unlimited.fireflyLimit = kInfinity;
   const Blocks blocks(camera, paths);
-  const LightTracing tracing{1, emission};
-  std::vector<Chunk> chunks((paths + kChunk - 1) / kChunk);
-  parallelFor(std::size_t{0}, chunks.size(), [&](std::size_t c) {
-    Chunk& chunk = chunks[c];
-    const PathLoop loop(scene, options, guide);
-    BidirectionalPaths light(scene, camera, options, guide, lightGuide);
-    const int first = static_cast<int>(c) * kChunk;
-    for (int i = first; i < std::min(paths, first + kChunk); ++i) {
-      Sampler rng(seed ^ kTag, 0, i), lightRng(seed ^ kTag, 1, i);
-      const Vec2 pixel = rng.uniform2();
-      const Vec2 film(pixel.x() * static_cast<float>(camera.width()), pixel.y() * static_cast<float>(camera.height()));
-      const Ray ray = camera.sample(static_cast<int>(film.x()), static_cast<int>(film.y()), rng);
-      chunk.samples.push_back({blocks.at(film), luminance(loop.radiance(ray, rng, chunk.camera))});
-      light.traceLight(tracing, lightRng, chunk.light, chunk.splats);
-    }
-  });
-
-  const std::vector<double> squares = squaredValues(chunks, blocks.count());
-  PathStatistics cameraWork, lightWork;
-  for (const Chunk& chunk : chunks) cameraWork += chunk.camera, lightWork += chunk.light;
-  const double cost = cameraWork.cost() / paths, lightCost = lightWork.cost() / paths;
-  std::vector<double> means(blocks.count()), counts(blocks.count()), deviations;
-  for (const Chunk& chunk : chunks)
-    for (const CameraSample& s : chunk.samples) means[s.block] += s.radiance, counts[s.block] += 1;
-  for (std::size_t i = 0; i < means.size(); ++i) means[i] /= std::max(1.0, counts[i]);
-  for (const Chunk& chunk : chunks)
-    for (const CameraSample& s : chunk.samples) {
-      const double difference = s.radiance - means[s.block];
-      deviations.push_back(squares[s.block] > 0 ? difference * difference / squares[s.block] : 0);
-    }
-  const double variance = trimmedMean(std::move(deviations));
-
+  const std::vector<Chunk> chunks = trace(scene, camera, unlimited, guide, {1, emission}, blocks, paths, seed);
+  const BlockValues values = valuesOf(chunks, blocks.count());
+  PathStatistics ofCamera, ofLight;
+  for (const Chunk& chunk : chunks) ofCamera += chunk.camera, ofLight += chunk.light;
+  const double variance = trimmedVariance(chunks, values), cost = ofCamera.cost() / paths;
   const double pixels = static_cast<double>(camera.width()) * camera.height();
-  LightPathTrial best;
+  std::vector<LightPathTrial> trials;
   for (const double perPixel : kPathsPerPixel) {
-    LightPathTrial trial{variance, cost, perPixel, 0, 0, kWeightingCost * cost + perPixel * lightCost};
-    const double count = perPixel * pixels;
+    LightPathTrial& trial = trials.emplace_back();
+    trial.variance = variance, trial.cost = cost, trial.pathsPerPixel = perPixel;
+    trial.costWithLight = kWeightingCost * cost + perPixel * ofLight.cost() / paths;
     for (const Chunk& chunk : chunks)
-      for (const Splat& splat : chunk.splats) {
-        // Of a single light path, without weights.
-        const double whole = luminance(splat.value) * pixels * (1.0 + splat.others);
-        const double scale = squares[blocks.at(splat.film)] * pixels * paths;
-        if (!(whole > 0) || !(scale > 0)) continue;
-        // Light that camera paths cannot find at all would have an infinite second moment.
-        const double others = std::max(splat.others / squared(perPixel), kLeastOthers);
-        const double weight = 1 / (1 + others);
-        const double moment = squared(whole) / (count * std::sqrt(others)) / scale;
-        trial.secondMoment += moment;
-        trial.left += moment * squared(others * weight) + squared(whole * weight) / count / scale;
-      }
-    if (best.pathsPerPixel == 0 || trial.inefficiencyWithLight() < best.inefficiencyWithLight()) best = trial;
+      for (const Splat& splat : chunk.splats)
+        addMoments(trial, splat, pixels, values.squares[blocks.at(splat.film)] * pixels * paths);
   }
-  return best;
+  const double best =
+      std::ranges::min_element(trials, {}, &LightPathTrial::inefficiencyWithLight)->inefficiencyWithLight();
+  return *std::ranges::find_if(trials, [&](const auto& t) { return t.inefficiencyWithLight() <= kTolerance * best; });
 }
 
 }  // namespace lobe
