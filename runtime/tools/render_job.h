@@ -82,7 +82,7 @@ struct RenderJob {
   /// Whether illumination is trained, from which the integrator may sample directions.
   bool guided() const;
   /// Whether camera paths may be combined with light paths.
-  bool mayUseLightPaths() const { return guided() && integrator != IntegratorKind::bdpt; }
+  bool mayUseLightPaths() const { return guided() && integrator != IntegratorKind::bdpt && !gradients; }
   /// Whether directions may be sampled from the product, which needs BRDF caches.
   bool mayUseProduct() const;
 

@@ -47,12 +47,13 @@ PathOptions pathOptions(const RenderJob& job, const Scene& scene) {
 
 /// Guided path tracing with light paths; null if they do not pay.
 std::unique_ptr<BidirectionalIntegrator> makeWithLightPaths(const RenderJob& job, const RenderScene& scene,
-                                                            const RayCamera& camera, const PathOptions& options,
+                                                            const RayCamera& camera, PathOptions options,
                                                             Guiding& guiding) {
   // The inefficiency must fall to this fraction: most pixels have no outliers and lose the time of the light paths.
   constexpr double kGain = 0.5;
   constexpr double kPaths = 50000;
-  if (job.lightPaths == LightPathUse::off || scene.lights.empty()) return nullptr;
+  options.rendered = nullptr;
+  if (!job.mayUseLightPaths() || job.lightPaths == LightPathUse::off || scene.lights.empty()) return nullptr;
   const Stopwatch watch;
   const int paths = static_cast<int>(kPaths * preparationSize(job));
   if (scene.lights.environmentProbability() > 0)
@@ -64,6 +65,7 @@ std::unique_ptr<BidirectionalIntegrator> makeWithLightPaths(const RenderJob& job
   guiding.usesLightPaths =
       job.lightPaths == LightPathUse::on || trial.inefficiencyWithLight() < kGain * trial.inefficiency();
   if (!guiding.usesLightPaths) return nullptr;
+  guiding.rendered.reset();  // light paths have no waves of independent numbers (RenderOptions::learn)
   return std::make_unique<GuidedLightIntegrator>(scene, camera, options, *guiding.sampler,
                                                  LightTracing{trial.pathsPerPixel, emission});
 }
@@ -181,7 +183,7 @@ AnyIntegrator makeIntegrator(const RenderJob& job, const RenderScene& scene, con
                              Guiding& guiding) {
   if (job.integrator == IntegratorKind::bdpt) return makeBdpt(job, scene, camera, guiding);
   if (job.integrator == IntegratorKind::vcm) return makeVcm(job, scene, camera);
-  std::unique_ptr<Integrator> integrator = makeUnidirectional(job, scene, camera, guiding);
+  AnyIntegrator integrator = makeUnidirectional(job, scene, camera, guiding);
   if (job.gradients) return makeGradients(job, scene, camera, guiding);
   return integrator;
 }
