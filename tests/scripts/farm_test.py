@@ -80,7 +80,7 @@ class Cluster:
     """A Slurm cluster of one node in a folder, which ends with the context."""
 
     def __init__(self, folder):
-        self.folder, self.daemons, self.hastened = folder, [], set()
+        self.folder, self.processes, self.hastened = folder, [], set()
         for name in ("state", "spool"):
             (folder / name).mkdir(parents=True)
         host = socket.gethostname().split(".")[0]
@@ -89,6 +89,14 @@ class Cluster:
         self.environment = os.environ | {"SLURM_CONF": str(folder / "slurm.conf")}
 
     def __enter__(self):
+        try:
+            self.start_all()
+        except BaseException:
+            self.__exit__(*sys.exc_info())
+            raise
+        return self
+
+    def start_all(self):
         key = self.folder / "munge.key"
         subprocess.run(["mungekey", "--create", "--keyfile", key], check=True)
         self.start("munged", "--foreground", "--force", "--key-file", key, "--num-threads", "2",
@@ -98,16 +106,20 @@ class Cluster:
         self.start("slurmctld", "-D", "-i")
         self.start("slurmd", "-D")
         until(lambda: "idle" in self.run("sinfo", "--noheader", "--format=%t"), "the node does not become idle")
-        return self
 
     def __exit__(self, *error):
-        for daemon in reversed(self.daemons):
-            daemon.terminate()
-        for daemon in self.daemons:
+        if error[0]:  # jobs would outlive slurmd
+            self.run("scancel", "--user", getpass.getuser())
+            end = time.monotonic() + 10
+            while self.run("squeue", "--noheader") and time.monotonic() < end:
+                time.sleep(0.1)
+        for process in reversed(self.processes):
+            process.terminate()
+        for process in self.processes:
             try:
-                daemon.wait(10)
+                process.wait(10)
             except subprocess.TimeoutExpired:
-                daemon.kill()
+                process.kill()
         if error[0]:
             for log in sorted(self.folder.rglob("*.log")):
                 if not log.name.endswith(".out.log"):
@@ -115,13 +127,14 @@ class Cluster:
 
     def start(self, *command):
         with open(self.folder / f"{command[0]}.out.log", "w") as log:
-            self.daemons.append(subprocess.Popen(texts(*command), env=self.environment, stdout=log, stderr=log))
+            self.processes.append(subprocess.Popen(texts(*command), env=self.environment, stdout=log, stderr=log))
 
     def run(self, *command):
         return subprocess.run(texts(*command), env=self.environment, capture_output=True, text=True).stdout
 
     def popen(self, command):
-        return subprocess.Popen(texts(*command), env=self.environment)
+        self.processes.append(subprocess.Popen(texts(*command), env=self.environment))
+        return self.processes[-1]
 
     def hasten(self):
         """Starts jobs soon that were put back into the queue. Slurm waits two minutes; nodes refuse a job within the second of its end."""
@@ -239,6 +252,7 @@ def main():
         print(f"skipped: not installed: {', '.join(missing)} (packages slurm-wlm and munge)")
         return SKIPPED
     tools = pathlib.Path(sys.argv[1]).resolve()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # the cluster ends with the test
     with tempfile.TemporaryDirectory(prefix="lobe-farm-") as name:
         folder = pathlib.Path(name)
         with Cluster(folder / "slurm") as cluster:
