@@ -29,13 +29,13 @@ std::optional<DeltaSample> deltaComponent(const SurfaceHit& hit, double componen
   // Components have intervals of `choice` in their order. The first and the last are the most frequent.
   float low = 0.0f, high = kOneMinusEpsilon;
   for (const float choice : {low, high}) {
-    const std::optional<DeltaSample> sample = sampleDelta(hit, choice);
+    std::optional<DeltaSample> sample = sampleDelta(hit, choice);
     if (sample && sample->component == component) return sample;
   }
   constexpr int kSteps = 24;
   for (int i = 0; i < kSteps; ++i) {
     const float middle = 0.5f * (low + high);
-    const std::optional<DeltaSample> sample = sampleDelta(hit, middle);
+    std::optional<DeltaSample> sample = sampleDelta(hit, middle);
     if (!sample || sample->component == component) return sample;
     (sample->component < component ? low : high) = middle;
   }
