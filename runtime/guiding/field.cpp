@@ -122,10 +122,6 @@ Field fieldOf(IlluminationCache cache) {
   return Field(std::move(data));
 }
 
-void refitWith(Field& field, const RenderedSamples& rendered) {
-  trainerOf(*field.data_).refit(rendered);
-}
-
 std::size_t Field::records() const {
   return cache().size();
 }

@@ -20,7 +20,5 @@ struct FieldData {
 const IlluminationCache& cacheOf(const Field& field);
 /// A field with these records that cannot be trained.
 Field fieldOf(IlluminationCache cache);
-/// Field::refit with the samples of a render in addition to the particles of training (IlluminationTrainer::refit).
-void refitWith(Field& field, const RenderedSamples& rendered);
 
 }  // namespace lobe

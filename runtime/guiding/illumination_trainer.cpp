@@ -157,17 +157,6 @@ void IlluminationTrainer::refit() {
   rebuildCache();
 }
 
-void IlluminationTrainer::refit(const RenderedSamples& rendered) {
-  parallelFor(std::size_t{0}, std::min(records_.size(), rendered.records()), [&](std::size_t i) {
-    std::vector<WeightedPoint> points = rendered.effectivePoints(i);
-    if (points.empty()) return;
-    const std::vector<WeightedPoint> trained = records_[i].reservoir.points();
-    points.insert(points.end(), trained.begin(), trained.end());
-    records_[i].em.refit(points);
-  });
-  rebuildCache();
-}
-
 void IlluminationTrainer::shrinkRadius(Training& record) const {
   // For a receiver that moves sideways by R, the direction to a source at distance d turns by about atan(R/d). A
   // component may turn by κ standard deviations of its narrowest axis.

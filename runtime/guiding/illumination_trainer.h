@@ -10,7 +10,6 @@
 #include "runtime/guiding/illumination_cache.h"
 #include "runtime/guiding/particle_neighbours.h"
 #include "runtime/guiding/point_reservoir.h"
-#include "runtime/guiding/rendered_samples.h"
 #include "runtime/mixture/em.h"
 
 namespace lobe {
@@ -46,9 +45,6 @@ class IlluminationTrainer {
 
   /// Fits every record once more to the points of its reservoir.
   void refit();
-  /// Fits every record that has samples of a render to the points of its reservoir and these samples. Places and radii
-  /// of the records stay as they are.
-  void refit(const RenderedSamples& rendered);
 
   /// The records as of the last pass.
   const IlluminationCache& cache() const { return cache_; }

@@ -147,10 +147,6 @@ std::optional<float> SurfaceDistribution::reflectedRadiance(float albedo) const 
                                     (shaped ? self.density->reflected() : self.reflectance.backgroundMass));
 }
 
-Float3 SurfaceDistribution::inRecordFrame(const Float3& wi) const {
-  return toFloats(Vec3(impl().axes * toEigen(wi)));
-}
-
 bool SurfaceDistribution::learnsFraction() const {
   return decision_ == GuidingDecision::product || (decision_ == GuidingDecision::illumination && impl().product);
 }

@@ -23,8 +23,7 @@ Film::Pixel loaded(const StoredPixel& p) {
 /// All counters of the statistics, in a fixed order.
 template <class Statistics>
 auto countersOf(Statistics& statistics) {
-  std::vector<decltype(&statistics.paths)> all{&statistics.paths, &statistics.segments, &statistics.shadowRays,
-                                               &statistics.refits};
+  std::vector<decltype(&statistics.paths)> all{&statistics.paths, &statistics.segments, &statistics.shadowRays};
   for (auto& count : statistics.strategies) all.push_back(&count);
   for (auto& count : statistics.decisions) all.push_back(&count);
   for (auto& key : statistics.largest.keys) all.push_back(&key);

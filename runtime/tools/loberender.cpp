@@ -145,9 +145,7 @@ void declare(CLI::App& app, Options& options) {
   app.add_option("--sample-offset", job.sampleOffset,
                  "Index of the first sample, to render parts of a picture for lobecompare --merge")
       ->capture_default_str();
-  app.add_option("--seconds", job.seconds,
-                 "Time for training and rendering in seconds, instead of --spp; the illumination also learns from the "
-                 "samples of the picture");
+  app.add_option("--seconds", job.seconds, "Time for training and rendering in seconds, instead of --spp");
   app.add_option("--size", options.size, "Picture size in pixels (default: the size in the scene)")
       ->type_name("WIDTHxHEIGHT");
   app.add_option("--max-depth", job.maxDepth,

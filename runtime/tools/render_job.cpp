@@ -43,11 +43,6 @@ bool RenderJob::mayUseProduct() const {
   return integrator == IntegratorKind::product || integrator == IntegratorKind::automatic;
 }
 
-bool RenderJob::learnsWhileRendering() const {
-  return seconds && guided() && integrator != IntegratorKind::bdpt && !gradients && illumination.empty() &&
-         resume.empty() && reduction == 0;
-}
-
 void RenderJob::validate() const {
   const auto require = [](bool condition, const std::string& message) {
     if (!condition) throw UsageError(message);

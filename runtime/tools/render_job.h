@@ -86,11 +86,6 @@ struct RenderJob {
   /// Whether directions may be sampled from the product, which needs BRDF caches.
   bool mayUseProduct() const;
 
-  /// Whether the records are also fitted to the samples of the picture while it is rendered. Only in runs of a fixed
-  /// time, because otherwise the picture would depend on how its samples are divided into runs (--sample-offset,
-  /// --resume).
-  bool learnsWhileRendering() const;
-
   /// Throws UsageError that names the option.
   void validate() const;
 };

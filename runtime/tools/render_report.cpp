@@ -109,7 +109,6 @@ nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, c
           {"seconds_sample_counts", run.guiding.secondsCounts},
           {"seconds_rendering", total.seconds},
           {"spp", total.samples},
-          {"refits_while_rendering", paths.refits},
           {"rays", paths.rays()},
           {"path_segments", paths.segments},
           {"segments_per_second", static_cast<double>(paths.segments) / total.seconds},

@@ -18,13 +18,11 @@
 #include "runtime/analysis/record_view.h"
 #include "runtime/core/atomic_file.h"
 #include "runtime/core/stopwatch.h"
-#include "runtime/guiding/field_data.h"
 #include "runtime/image/image_output.h"
 #include "runtime/render/integrators/renderer.h"
 #include "runtime/render/training/light_learning.h"
 #include "runtime/tools/checkpoint.h"
 #include "runtime/tools/json_text.h"
-#include "runtime/tools/learning_schedule.h"
 #include "runtime/tools/render_files.h"
 #include "runtime/tools/render_report.h"
 #include "runtime/tools/render_setup.h"
@@ -108,8 +106,7 @@ class Run {
   void readIllumination(const IlluminationFile& file, const std::filesystem::path& path);
   void makeGuiding();
   void saveTraining();
-  RenderOptions options();
-  bool learn(LearningSchedule& schedule, const RenderProgress& progress);
+  RenderOptions options() const;
   double fractionDone() const;
   bool snapshotIsDue() const;
   void snapshot();
@@ -221,10 +218,6 @@ void Run::makeGuiding() {
         encodeIllumination({guiding_.training.importance, guiding_.training.report, {}, {}}, plan, *scene_, job_.scene);
   guiding_.reduceRecords(job_.reduction);
   guiding_.sampler.emplace(*scene_, guiding_.training.field, guiding_.cachesOrNull());
-  if (plan.keepTraining) {
-    guiding_.rendered.emplace(guiding_.training.field.records(), plan.records.reservoir);
-    guiding_.rendered->setOpen(false);  // to the pilot
-  }
   guiding_.lightSampler.emplace(*scene_, guiding_.training.importance, nullptr);
 }
 
@@ -239,33 +232,12 @@ void Run::saveTraining() {
   for (const std::string& error : ofCheckpoint.all()) printWarning(kTool, error);
 }
 
-/// Fits the records to the samples so far if it is time; returns whether it has.
-bool Run::learn(LearningSchedule& schedule, const RenderProgress& progress) {
-  const bool due = schedule.isDue(progress);
-  if (due) {
-    const Stopwatch watch;
-    refitWith(guiding_.training.field, *guiding_.rendered);
-    schedule.fitted(progress, watch.seconds());
-    if (!job_.checkpoint.empty())
-      illumination_ = encodeIllumination(guiding_.training, planOf(job_), *scene_, job_.scene);
-  }
-  guiding_.rendered->setOpen(!schedule.isOver(progress));
-  return due;
-}
-
-RenderOptions Run::options() {
+RenderOptions Run::options() const {
   RenderOptions options{job_.seed, job_.samples, std::nullopt, job_.sampling, job_.sampleOffset};
   if (job_.seconds) options.seconds = std::max(*job_.seconds - prepared(), 1e-3);
   if (const double every = job_.snapshotEvery.value_or(RenderJob::kSnapshotSeconds); every > 0)
     options.longestWave = every;
   options.stop = &stop_;
-  const bool guided = !guiding_.pilot || guiding_.pilot->best() != IntegratorKind::path;
-  if (guiding_.rendered && guided && guiding_.training.field.records() > 0) {
-    guiding_.rendered->setOpen(true);
-    options.learn = [this, schedule = LearningSchedule(*options.seconds)](const RenderProgress& progress) mutable {
-      return learn(schedule, progress);
-    };
-  }
   return options;
 }
 

@@ -47,14 +47,13 @@ PathOptions pathOptions(const RenderJob& job, const Scene& scene) {
 
 /// Guided path tracing with light paths; null if they do not pay.
 std::unique_ptr<BidirectionalIntegrator> makeWithLightPaths(const RenderJob& job, const RenderScene& scene,
-                                                            const RayCamera& camera, PathOptions options,
+                                                            const RayCamera& camera, const PathOptions& options,
                                                             Guiding& guiding) {
   // The inefficiency must fall to this fraction: most pixels have no outliers and lose the time of the light paths, and
   // the trial does not see outliers that light paths cannot find. In the kitchenette, where it falls to 0.43 of its
   // value in the trial, light paths gain nothing.
   constexpr double kGain = 0.25;
-  constexpr double kPaths = 50000;
-  options.rendered = nullptr;
+  constexpr double kPaths = 10000;
   if (!job.mayUseLightPaths() || job.lightPaths == LightPathUse::off || scene.lights.empty()) return nullptr;
   const Stopwatch watch;
   const int paths = static_cast<int>(kPaths * preparationSize(job));
@@ -67,7 +66,6 @@ std::unique_ptr<BidirectionalIntegrator> makeWithLightPaths(const RenderJob& job
   guiding.usesLightPaths =
       job.lightPaths == LightPathUse::on || trial.inefficiencyWithLight() < kGain * trial.inefficiency();
   if (!guiding.usesLightPaths) return nullptr;
-  guiding.rendered.reset();  // light paths have no waves of independent numbers (RenderOptions::learn)
   return std::make_unique<GuidedLightIntegrator>(scene, camera, options, *guiding.sampler,
                                                  LightTracing{trial.pathsPerPixel, emission});
 }
@@ -82,7 +80,6 @@ AnyIntegrator makeUnidirectional(const RenderJob& job, const RenderScene& scene,
     learnCounts(job, scene, camera, options, guiding);
     options.counts = &*guiding.counts;
   }
-  if (guiding.rendered) options.rendered = &*guiding.rendered;
   auto guided = std::make_unique<GuidedIntegrator>(scene, options, *guiding.sampler);
   if (job.integrator == IntegratorKind::automatic) {
     const Stopwatch watch;
@@ -128,7 +125,6 @@ TrainingPlan planOf(const RenderJob& job) {
   TrainingPlan plan = job.training;
   plan.seed = job.seed;
   plan.keepParticles = job.record.has_value();
-  plan.keepTraining = job.learnsWhileRendering();
   plan.keepImportance = job.integrator == IntegratorKind::bdpt;
   plan.seconds = job.trainSeconds.value_or(job.seconds ? kTrainingFraction * *job.seconds : kInfinity);
   // If the time is limited and --passes is not given, only the time limits the number of passes.

@@ -7,7 +7,6 @@
 #include <variant>
 
 #include "runtime/guiding/brdf_caches.h"
-#include "runtime/guiding/rendered_samples.h"
 #include "runtime/render/gradients/gradient_integrator.h"
 #include "runtime/render/integrators/bidirectional_integrator.h"
 #include "runtime/render/integrators/guided_integrator.h"
@@ -44,9 +43,8 @@ struct Guiding {
   std::optional<GuidedSampler> sampler;
   std::optional<GuidedSampler> lightSampler;  ///< of the light paths of bdpt
   std::optional<SampleCountModel> counts;
-  std::optional<RenderedSamples> rendered;  ///< of the picture, if the records learn from them
-  double secondsLights = 0;                 ///< time for learning the choice of lights
-  double secondsCounts = 0;                 ///< time for learning the counts
+  double secondsLights = 0;  ///< time for learning the choice of lights
+  double secondsCounts = 0;  ///< time for learning the counts
   std::optional<Pilot> pilot;
   std::optional<EnvironmentGuide> environmentGuide;  ///< of the light paths of guided and product
   std::optional<LightPathTrial> lightPaths;          ///< if they were tried

@@ -10,7 +10,6 @@
 #include "runtime/core/random.h"
 #include "runtime/guiding/particle_tree.h"
 #include "runtime/guiding/point_reservoir.h"
-#include "runtime/guiding/rendered_samples.h"
 #include "runtime/guiding/request_cubes.h"
 #include "runtime/guiding/sample_storage_data.h"
 
@@ -189,72 +188,4 @@ TEST_CASE("guiding: a reservoir estimates sums over all points without bias") {
   INFO("mean " << mean << ", expected " << expected << ", standard error " << standardError);
   CHECK(std::abs(mean - expected) < 4 * standardError);
   CHECK(standardError < 0.005 * expected);
-}
-
-TEST_CASE("guiding: samples of a render estimate sums over all samples without bias") {
-  constexpr int kRepeats = 4000, kCount = 800;
-  std::vector<WeightedPoint> points;
-  Rng rng(17);
-  double expected = 0;
-  for (int i = 0; i < kCount; ++i) {
-    const float weight = std::pow(10.0f, -4 * rng.uniform());
-    points.push_back({{i % 2 == 0 ? 0.5f : -0.5f, 0}, weight});
-    expected += i % 2 == 0 ? weight : 0;
-  }
-  double mean = 0, square = 0;
-  for (int repeat = 0; repeat < kRepeats; ++repeat) {
-    RenderedSamples samples(2, 60);
-    for (const WeightedPoint& p : points) samples.add(1, p.y, p.weight, rng.uniform());
-    REQUIRE(samples.points(1).size() == 60);
-    double sum = 0;
-    for (const WeightedPoint& p : samples.points(1)) sum += p.y.x() > 0 ? p.weight : 0.0f;
-    mean += sum / kRepeats;
-    square += sum * sum / kRepeats;
-  }
-  const double standardError = std::sqrt((square - mean * mean) / kRepeats);
-  INFO("mean " << mean << ", expected " << expected << ", standard error " << standardError);
-  CHECK(std::abs(mean - expected) < 4 * standardError);
-  CHECK(standardError < 0.005 * expected);
-}
-
-TEST_CASE("guiding: samples of a render weigh as much as their effective number") {
-  RenderedSamples samples(1, 10);
-  const auto sum = [&] {
-    double all = 0;
-    for (const WeightedPoint& p : samples.effectivePoints(0)) all += p.weight;
-    return all;
-  };
-  CHECK(samples.effectivePoints(0).empty());
-  samples.add(0, {0, 0}, 0, 0.5f);
-  samples.add(0, {0, 0}, std::numeric_limits<float>::infinity(), 0.5f);
-  CHECK(samples.points(0).empty());
-  samples.add(0, {0, 0}, 8, 0.5f);
-  samples.add(0, {0.5f, 0}, 2, 0.5f);
-  CHECK(sum() == Approx(100.0 / 68));
-  CHECK(samples.points(0)[0].weight == 8);
-  for (int i = 0; i < 8; ++i) samples.add(0, {0.5f, 0}, 2, 0.5f);
-  CHECK(sum() == Approx(26 * 26.0 / 100));
-}
-
-TEST_CASE("guiding: samples of a render do not depend on the order in which they are added") {
-  std::vector<std::pair<WeightedPoint, float>> points;
-  Rng rng(18);
-  // Few different weights and random numbers, so that priorities are equal.
-  for (int i = 0; i < 1000; ++i)
-    points.push_back({{rng.uniform2() - Vec2(0.5f, 0.5f), std::exp2(-std::floor(4 * rng.uniform()))},
-                      std::floor(8 * rng.uniform()) / 8});
-  const auto kept = [&] {
-    RenderedSamples samples(1, 50);
-    for (const auto& [p, u] : points) samples.add(0, p.y, p.weight, u);
-    return samples.effectivePoints(0);
-  };
-  const std::vector<WeightedPoint> first = kept();
-  for (int repeat = 0; repeat < 20; ++repeat) {
-    for (std::size_t i = points.size(); i-- > 1;)
-      std::swap(points[i], points[static_cast<std::size_t>(rng.uniform() * static_cast<float>(i + 1))]);
-    const std::vector<WeightedPoint> again = kept();
-    REQUIRE(again.size() == first.size());
-    for (std::size_t i = 0; i < first.size(); ++i)
-      REQUIRE((again[i].y == first[i].y && again[i].weight == first[i].weight));
-  }
 }

@@ -68,7 +68,6 @@ class Studio {
   const GuidedSampler& importanceSampler() const { return *importanceSampler_; }
   const IlluminationCache& illumination() const { return cacheOf(illumination_); }
   const Field& importance() const { return importance_; }
-  const LobeCacheSet& caches() const { return *caches_; }
   std::filesystem::path lobes() const { return folder_ / "lobes"; }
 
  private:

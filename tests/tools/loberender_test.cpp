@@ -351,7 +351,8 @@ TEST_CASE("loberender: statistics and convergence and images of a run") {
     CHECK(training > 0);
     CHECK(rendering > 0);
     const double preparing = s.at("seconds_learning_lights").get<double>() +
-                             s.at("seconds_sample_counts").get<double>() + s.at("pilot").at("seconds").get<double>();
+                             s.at("seconds_sample_counts").get<double>() + s.at("pilot").at("seconds").get<double>() +
+                             s.value("/light_paths/seconds"_json_pointer, 0.0);
     CHECK(s.at("seconds_total").get<double>() == Approx(training + preparing + rendering));
     CHECK(s.at("spp") >= 1);
     CHECK(s.at("rays") >= s.at("path_segments"));

@@ -34,13 +34,11 @@ struct FieldOptions {
 
 class Field;
 class IlluminationCache;
-class RenderedSamples;
 struct FieldData;
 
 // For internal use by the library and its tools; see runtime/guiding/field_data.h.
 const IlluminationCache& cacheOf(const Field& field);
 Field fieldOf(IlluminationCache cache);
-void refitWith(Field& field, const RenderedSamples& rendered);
 
 /// The trained illumination. Copies are cheap and share their content: an update of one changes all of them, while
 /// frozen() and reduced() make independent fields.
@@ -100,7 +98,6 @@ class Field {
   friend class SurfaceDistribution;
   friend const IlluminationCache& cacheOf(const Field& field);
   friend Field fieldOf(IlluminationCache cache);
-  friend void refitWith(Field& field, const RenderedSamples& rendered);
   explicit Field(std::shared_ptr<FieldData> data);
   const IlluminationCache& cache() const;
   std::shared_ptr<FieldData> data_;

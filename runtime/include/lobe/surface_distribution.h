@@ -130,10 +130,6 @@ class SurfaceDistribution {
   /// a record, if undescribedFraction > 0, or if training used no photons, from which the irradiance is estimated.
   std::optional<float> reflectedRadiance(float albedo) const;
 
-  /// A direction of the shading frame in the frame of the record's mixture, whose z axis is the shading normal on the
-  /// side of wo. Requires hasRecord().
-  Float3 inRecordFrame(const Float3& wi) const;
-
   /// Whether a direction sampled here is a training sample for the BSDF sampling fraction. If so,
   /// PathRecorder::addVertex needs RecordedVertex::bsdfPdf.
   bool learnsFraction() const;

@@ -81,13 +81,6 @@ std::optional<VertexEstimate> GuidedSampler::Vertex::estimate() const {
   return VertexEstimate{*radiance, distribution_.recordIndex()};
 }
 
-std::optional<RecordDirection> GuidedSampler::Vertex::inRecord(const Vec3& wi) const {
-  if (!distribution_.hasRecord()) return std::nullopt;
-  const Float3 local = distribution_.inRecordFrame(asFloats(wi));
-  if (!(local.z > 0)) return std::nullopt;
-  return RecordDirection{distribution_.recordIndex(), {local.x, local.y, local.z}};
-}
-
 Rgb GuidedIntegrator::radiance(const Ray& ray, Sampler& rng, PathStatistics& statistics) const {
   return PathLoop(scene_, options_, sampler_).radiance(ray, rng, statistics);
 }

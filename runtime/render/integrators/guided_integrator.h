@@ -28,7 +28,6 @@ class GuidedSampler {
     std::optional<BsdfSample> sample(Sampler& rng, PathStatistics& statistics) const;
     float pdf(const Vec3& wi) const;
     std::optional<VertexEstimate> estimate() const;
-    std::optional<RecordDirection> inRecord(const Vec3& wi) const;
     const SurfaceDistribution& distribution() const { return distribution_; }
 
    private:

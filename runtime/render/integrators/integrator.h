@@ -29,7 +29,6 @@ struct PathStatistics {
   std::uint64_t paths = 0;
   std::uint64_t segments = 0;    ///< rays traced to extend paths
   std::uint64_t shadowRays = 0;  ///< rays traced towards lights
-  std::uint64_t refits = 0;      ///< number of times that the picture's samples have changed the guiding
   std::array<std::uint64_t, kScatteringNames.size()> strategies{};
   std::array<std::uint64_t, kGuidingDecisionNames.size()> decisions{};
   LargestContributions largest;
@@ -52,7 +51,6 @@ struct PathStatistics {
     paths += other.paths;
     segments += other.segments;
     shadowRays += other.shadowRays;
-    refits += other.refits;
     for (std::size_t i = 0; i < strategies.size(); ++i) strategies[i] += other.strategies[i];
     for (std::size_t i = 0; i < decisions.size(); ++i) decisions[i] += other.decisions[i];
     largest.add(other.largest);

@@ -16,9 +16,6 @@
 //       float pdf(const Vec3& wi) const;
 //       // Decides on the counts of samples, see sample_counts.h; nullopt: unknown.
 //       std::optional<VertexEstimate> estimate() const;
-//       // Only for guides that learn from PathOptions::rendered: the direction in the frame of the record that serves
-//       // the vertex; nullopt if there is none, or if the direction is below its horizon.
-//       std::optional<RecordDirection> inRecord(const Vec3& wi) const;
 //     };
 //   };
 //
@@ -29,9 +26,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <vector>
 
-#include "runtime/guiding/rendered_samples.h"
 #include "runtime/render/integrators/integrator.h"
 #include "runtime/render/integrators/light_tracing.h"
 #include "runtime/render/integrators/sample_counts.h"
@@ -46,8 +41,6 @@ struct PathOptions {
   /// the pixel are stratified, and more of them are worth more than splitting. Null, and without an estimate: Russian
   /// roulette by throughput.
   const SampleCountModel* counts = nullptr;
-  /// Where paths add the incident radiance that they find, as long as it is open. Null: nowhere.
-  RenderedSamples* rendered = nullptr;
   EmitterVisibility emitterVisibility = EmitterVisibility::shown;
   /// Limits the luminance of the indirect light of a sample (FoundLight), and that of every contribution of a light
   /// path that is connected to the camera, > 0. The picture is biased if it is finite.
@@ -60,12 +53,6 @@ inline constexpr float kMaxSurvival = 0.95f;
 /// Upper bound of the branches that splitting makes of one camera path.
 inline constexpr float kMaxBranches = 16;
 
-/// A direction in the frame of the mixture of an illumination record.
-struct RecordDirection {
-  std::uint32_t record;  ///< index of the record
-  Vec3 direction;        ///< unit, z > 0
-};
-
 template <class Guide, class LightPaths = NoLightPaths>
 class PathLoop {
  public:
@@ -74,37 +61,22 @@ class PathLoop {
       : scene_(scene), options_(options), sampler_(sampler), lightPaths_(std::move(lightPaths)) {}
 
   Rgb radiance(const Ray& cameraRay, Sampler& rng, PathStatistics& statistics) const {
-    Continuations continuations;
     Path path{cameraRay, &rng, &statistics};
-    if (options_.rendered && options_.rendered->open()) path.continuations = &continuations;
     ++statistics.paths;
     follow(path);
-    addIncident(path, 0);
     return path.found.limited(options_.fireflyLimit, statistics.cut);
   }
 
   /// Traces a path without counts, and appends it to the log.
   void log(const Ray& cameraRay, Sampler& rng, PathLog& log) const {
     PathStatistics statistics;
-    Continuations continuations;
     Path path{cameraRay, &rng, &statistics};
     path.log = &log;
-    if (options_.rendered && options_.rendered->open()) path.continuations = &continuations;
     follow(path);
-    addIncident(path, 0);
     log.paths.push_back({log.vertices.size(), luminance(path.found.total()), static_cast<float>(statistics.cost())});
   }
 
  private:
-  // A direction in which a path has continued. What the rest of the path finds is incident radiance from there.
-  struct Continuation {
-    RecordDirection at;
-    float cosineOverPdf;
-    Rgb throughput;      // of the path that continues
-    Rgb radianceBefore;  // found by the path before it continued
-  };
-  using Continuations = std::vector<Continuation>;  // of a path and those that it has branched off from, in order
-
   struct Path {
     Ray ray;
     Sampler* rng;
@@ -120,7 +92,6 @@ class PathLoop {
     float reference = 0;  // SampleCountModel::reference; 0: no vertex had an estimate yet
     float branches = 1;   // expected number into which the camera path has been split so far
     PathLog* log = nullptr;
-    Continuations* continuations = nullptr;  // null: not wanted
   };
 
   void follow(Path& path) const {
@@ -248,9 +219,7 @@ class PathLoop {
       Path branch = path;
       branch.rng = &rng;
       branch.found = {};
-      const std::size_t first = path.continuations ? path.continuations->size() : 0;
       if (scatterAt(branch, at)) follow(branch);
-      addIncident(branch, first);
       path.found.add(branch.found);
     }
     return scatterAt(path, at);
@@ -302,26 +271,8 @@ class PathLoop {
     path.eta2 *= sample->eta * sample->eta;
     if (!continueAlong(path, hit, sample->wi, sample->f * (std::abs(sample->wi.z()) / pdf))) return false;
     path.emissionWeight.scattered(at.lights, path.ray.direction, pdf);
-    if constexpr (requires { at.vertex.inRecord(sample->wi); })
-      if (path.continuations)
-        if (const std::optional<RecordDirection> in = at.vertex.inRecord(sample->wi))
-          path.continuations->push_back({*in, in->direction.z() / pdf, path.throughput, path.found.total()});
     lightPaths_.scatter(path.lightTracing, hit, path.ray.direction, pdf);
     return true;
-  }
-
-  // Adds the incident radiance of the continuations from the given index on, which are those of this path, and removes
-  // them. Emission that they have found is weighted against next-event estimation, whose part is left out.
-  void addIncident(const Path& path, std::size_t first) const {
-    if (!path.continuations) return;
-    for (std::size_t i = first; i < path.continuations->size(); ++i) {
-      const Continuation& c = (*path.continuations)[i];
-      const Rgb light = path.found.total() - c.radianceBefore;
-      const float incident = luminance((c.throughput > 0).select(light / c.throughput, Rgb::Zero()));
-      if (incident > 0)
-        options_.rendered->add(c.at.record, toDisc(c.at.direction), incident * c.cosineOverPdf, path.rng->uniform());
-    }
-    path.continuations->resize(first);
   }
 
   bool scatterDelta(Path& path, const SurfaceHit& hit, float fraction) const {

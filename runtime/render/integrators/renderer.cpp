@@ -15,7 +15,6 @@ namespace {
 
 constexpr int kTileSize = 16;
 constexpr std::uint64_t kLightSeed = 0x6c69676874;  // keeps the random numbers of light paths apart
-constexpr std::uint64_t kRefitSeed = 0x7265666974526566;
 
 /// A part of the samples of all pixels.
 struct Wave {
@@ -26,16 +25,12 @@ struct Wave {
 /// The pixels of an image in tiles, with the random numbers of their samples.
 class Tiles {
  public:
-  Tiles(const RayCamera& camera, const RenderOptions& options)
-      : camera_(camera), options_(options), seed_(options.seed) {
+  Tiles(const RayCamera& camera, const RenderOptions& options) : camera_(camera), options_(options) {
     columns_ = (camera.width() + kTileSize - 1) / kTileSize;
     count_ = columns_ * ((camera.height() + kTileSize - 1) / kTileSize);
   }
 
   int count() const { return count_; }
-
-  /// Makes the samples from now on independent of those with another number of refits (PathStatistics::refits).
-  void setRefits(std::uint64_t refits) { seed_ = options_.seed + kRefitSeed * refits; }
 
   /// Calls renderPixel(x, y, tile, statistics) for all pixels, in parallel by tiles. Leaves out the tiles that have not
   /// begun when skip() returns true.
@@ -56,8 +51,8 @@ class Tiles {
 
   /// For sample s, counted from RenderOptions::firstSample.
   Sampler sampler(int x, int y, int s) const {
-    return options_.sampling == PixelSampling::sobol ? Sampler::stratified(seed_, pixelOf(x, y), indexOf(s))
-                                                     : Sampler(seed_, pixelOf(x, y), indexOf(s));
+    return options_.sampling == PixelSampling::sobol ? Sampler::stratified(options_.seed, pixelOf(x, y), indexOf(s))
+                                                     : Sampler(options_.seed, pixelOf(x, y), indexOf(s));
   }
   /// Independent numbers for the light path of the same sample.
   Sampler lightSampler(int x, int y, int s) const {
@@ -79,7 +74,6 @@ class Tiles {
 
   const RayCamera& camera_;
   const RenderOptions& options_;
-  std::uint64_t seed_;  // of camera paths
   int columns_, count_;
 };
 
@@ -92,9 +86,8 @@ class WaveRenderer {
   WaveRenderer(const RayCamera& camera, const AddSample& addSample, const Film& film, const RenderOptions& options)
       : addSample_(addSample), film_(film), stop_(options.stop), tiles_(camera, options) {}
 
-  /// Adds to every pixel the samples that it lacks to have `samples` of them. refits: see Tiles::setRefits.
-  Wave render(int samples, std::uint64_t refits) {
-    tiles_.setRefits(refits);
+  /// Adds to every pixel the samples that it lacks to have `samples` of them.
+  Wave render(int samples) {
     return tiles_.render(
         [&] { return isSet(stop_); },
         [&](int x, int y, int, PathStatistics& statistics) { renderPixel(x, y, samples, statistics); });
@@ -128,7 +121,7 @@ class BidirectionalRenderer {
         splats_(tiles_.count()) {}
 
   /// Adds samples until every pixel has `samples` of them.
-  Wave render(int samples, std::uint64_t) {
+  Wave render(int samples) {
     Wave wave;
     for (int s = static_cast<int>(film_.sampleRange().first); s < samples; ++s) {
       wave.complete = !isSet(stop_);
@@ -234,15 +227,12 @@ RenderResult renderWaves(Renderer renderer, const Film& film, const RenderOption
   result.stopped = false;
   while (const int samples = plan.next(progress)) {
     const Stopwatch watch;
-    const Wave wave = renderer.render(progress.samples + samples, result.statistics.refits);
-    const double secondsBefore = progress.seconds;
+    const Wave wave = renderer.render(progress.samples + samples);
     result.statistics += wave.statistics;
-    progress.seconds = secondsBefore + watch.seconds();
+    progress.seconds += watch.seconds();
     progress.samples = static_cast<int>(film.sampleRange().first);
     result.stopped = !wave.complete;
     if (result.stopped) break;
-    if (options.learn && options.learn(progress)) ++result.statistics.refits;
-    progress.seconds = secondsBefore + watch.seconds();
     if (afterWave) afterWave(result);
   }
   return result;

@@ -16,11 +16,6 @@ namespace lobe {
 /// first vertices (Sampler::stratified), or independent numbers.
 enum class PixelSampling { sobol, independent };
 
-struct RenderProgress {
-  double seconds;  ///< rendering time so far, without the time spent in callbacks
-  int samples;     ///< of every pixel so far
-};
-
 /// Exactly one of samples and seconds is set.
 struct RenderOptions {
   std::uint64_t seed = 1;
@@ -30,15 +25,14 @@ struct RenderOptions {
   int firstSample = 0;             ///< index of the first sample of every pixel; firstSample + samples must fit an int
   double longestWave = kInfinity;  ///< approximate limit in seconds of the time between calls of AfterWave
   const StopFlag* stop = nullptr;  ///< ends rendering after the current tiles when it is set
-  /// Called between waves, before AfterWave, while no thread renders; its time counts as rendering time. It may change
-  /// what the integrator samples from, depending on the samples so far, and returns whether it has. The samples after a
-  /// change use a scrambling of the Sobol' sequence that is independent of those before: samples that are stratified
-  /// among each other depend on each other, and a density that depends on some of them would bias the others. Only for
-  /// integrators without light paths.
-  std::function<bool(const RenderProgress&)> learn = {};
 
   /// Throws std::runtime_error that names the field.
   void validate() const;
+};
+
+struct RenderProgress {
+  double seconds;  ///< rendering time so far, without the time spent in callbacks
+  int samples;     ///< of every pixel so far
 };
 
 struct RenderResult {

@@ -168,7 +168,7 @@ TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera&
   report.seconds = watch.seconds();
   report.undersampledFraction = training.radiance().undersampledFraction();
   report.learntFractions = plan.learnFractions && caches != nullptr;
-  TrainedIllumination trained{plan.keepTraining ? training.radiance() : training.radiance().frozen(), report, {}, {}};
+  TrainedIllumination trained{training.radiance().frozen(), report, {}, {}};
   if (plan.keepImportance) trained.importance = training.importance().frozen();
   if (plan.keepParticles) trained.particles = training.takeParticles();
   return trained;

@@ -29,7 +29,6 @@ struct TrainingPlan {
   bool learnFractions = true;
   bool keepParticles = false;   ///< keep those of the last pass in TrainedIllumination::particles
   bool keepImportance = false;  ///< keep what guided the photons in TrainedIllumination::importance
-  bool keepTraining = false;    ///< TrainedIllumination::field can be trained further
   FieldOptions records;         ///< except for the scene's diagonal, which training sets
 
   /// Throws std::runtime_error that names the field.
