@@ -38,8 +38,8 @@ class Dielectric final : public Bsdf {
     const float passed = static_cast<float>(1.0 - fresnel.reflectance);
     if (!(passed > 0.0f) || wo.z() == 0.0f) return std::nullopt;  // total internal reflection
     const float e = static_cast<float>(eta);
-    return DeltaTransmission{refractedDirection(wo, fresnel, e), passed / (e * e) * transmittance_->eval(uv),
-                             e == 1.0f, e};
+    return DeltaTransmission{refractedDirection(wo, fresnel, e), passed / (e * e) * transmittance_->eval(uv), e == 1.0f,
+                             e};
   }
   float deltaProbability(const Vec3&, const Vec2&) const override { return 1.0f; }
 

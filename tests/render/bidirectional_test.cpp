@@ -55,7 +55,7 @@ bool agreesWithPath(const Stage& stage, int batches = 48, int samples = 12) {
 
 }  // namespace
 
-TEST_CASE("bidirectional: every kind of light gives the image of path tracing") {
+TEST_CASE("bidirectional: every kind of light gives the image of path tracing", "[slow]") {
   const auto [name, light] = GENERATE(table<std::string, std::string>(
       {{"rectangle", kLamp},
        {"sphere", R"(<shape type="sphere"><point name="center" x="1" y="0" z="1.5"/><float name="radius" value="0.4"/>
@@ -110,7 +110,7 @@ TEST_CASE("bidirectional: an environment with a bright spot gives the image of p
   CHECK(agreesWithPath(Stage(std::move(scene))));
 }
 
-TEST_CASE("bidirectional: every kind of surface gives the image of path tracing") {
+TEST_CASE("bidirectional: every kind of surface gives the image of path tracing", "[slow]") {
   const auto [name, surface] = GENERATE(table<std::string, std::string>(
       {{"mirror", R"(<bsdf type="conductor"/>)"},
        {"glass", R"(<bsdf type="dielectric"/>)"},
@@ -152,7 +152,7 @@ TEST_CASE("bidirectional: interpolated normals give the image of path tracing") 
   CHECK(agreesWithPath(Stage(std::move(scene))));
 }
 
-TEST_CASE("bidirectional: shading normals inside glass give the image of path tracing") {
+TEST_CASE("bidirectional: shading normals inside glass give the image of path tracing", "[slow]") {
   // Camera and floor are inside a block of glass, under a lamp outside, which only light paths and chance find: the
   // adjoint corrections for normals and refraction do not cancel.
   const std::string block = R"(
@@ -206,7 +206,7 @@ TEST_CASE("bidirectional: the caustic of a glass ball under a small lamp is that
   CHECK(samples * variance(fewer) < 0.5 * samplesOfPath * variance(path));
 }
 
-TEST_CASE("bidirectional: every kind of camera gives the image of path tracing") {
+TEST_CASE("bidirectional: every kind of camera gives the image of path tracing", "[slow]") {
   const std::string place = R"(<transform name="to_world"><lookat origin="0, -6, 2.5" target="0, 0, 0.9"
     up="0, 0, 1"/></transform>)";
   const std::string film = R"(<film type="hdrfilm"><integer name="width" value="20"/><integer name="height" value="15"/>
@@ -281,7 +281,7 @@ TEST_CASE("bidirectional: the radiance in a furnace is emission over one minus a
   CHECK(agree(withLight, std::vector<Block>(found.size(), Block{emission / (1 - albedo), 0})));
 }
 
-TEST_CASE("vcm: the radiance in a furnace is emission over one minus albedo") {
+TEST_CASE("vcm: the radiance in a furnace is emission over one minus albedo", "[slow]") {
   // On a large sphere merging has no noticeable bias.
   const float emission = 0.5f, albedo = 0.6f;
   Scene scene = sceneWith("");
@@ -429,7 +429,8 @@ TEST_CASE("bidirectional: stopped at any moment and continued, an image has the 
   checkStopping(stage, VcmIntegrator(stage.ready, stage.camera, stage.options, {0.3f, 0.5f}));
 }
 
-TEST_CASE("light paths: light that next-event estimation sees through surfaces gives the image of path tracing") {
+TEST_CASE("light paths: light that next-event estimation sees through surfaces gives the image of path tracing",
+          "[slow]") {
   const auto [name, material] = GENERATE(table<std::string, std::string>(
       {{"slab", R"(<bsdf type="dielectric"/>)"},
        {"panes", R"(<bsdf type="thindielectric"/>)"},

@@ -150,7 +150,7 @@ TEST_CASE("loberender: outputs beyond the file size limit are errors, and leave 
   // The limit lets the statistics through, but neither the pictures nor the illumination.
   const std::string render = kBin + "loberender scene.xml -o a.exr -o b.png --stats s.json --spp 1 --size 200x150" +
                              kTraining + " --save-illumination a.illum";
-  CHECK(runIn(folder, "ulimit -f 8; " + render + " 2>error") == "1");
+  CHECK(runIn(folder, "ulimit -f 28; " + render + " 2>error") == "1");
   const std::string errors = folder.bytes("error");
   CAPTURE(errors);
   for (const char* name : {"a.exr", "b.png", "a.illum"}) {

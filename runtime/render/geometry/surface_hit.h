@@ -58,8 +58,8 @@ SurfaceHit makeSurfaceHit(const Scene& scene, const Ray& ray, const Hit& hit);
 /// differ, because the mapped normal may depend on the direction. The distance is kept.
 SurfaceHit asSeenFrom(const Scene& scene, const SurfaceHit& hit, const Vec3& direction);
 
-/// Whether two views of a surface point have the same shading frame, so that a delta component takes the same way in both
-/// directions.
+/// Whether two views of a surface point have the same shading frame, so that a delta component takes the same way in
+/// both directions.
 inline bool sameFrame(const SurfaceHit& a, const SurfaceHit& b) {
   return a.frame.n.dot(b.frame.n) > 1.0f - 1e-5f;
 }

@@ -69,7 +69,8 @@ LightPassage PhotonWalk::passageAfter(const Branch& branch, const SurfaceHit& hi
 /// The fraction of a photon's light that next-event estimation leaves to BSDF sampling: the multiple importance weight
 /// of BSDF sampling, for which cosθ/π replaces the density that is not yet known. Zero for delta lights, which BSDF
 /// sampling does not find.
-float PhotonWalk::directFraction(const EmittedPhoton& photon, const LightPassage& passage, const SurfaceHit& hit) const {
+float PhotonWalk::directFraction(const EmittedPhoton& photon, const LightPassage& passage,
+                                 const SurfaceHit& hit) const {
   if (!passage.specular) return 1;
   if (photon.delta) return 0;
   if (!passage.found(photon.far)) return 1;
