@@ -1,10 +1,11 @@
 // Gradient-domain path tracing: the parts of the shift against finite differences and closed forms, the reconstruction
 // against a dense solver, and paths in closed forms.
 
-#include <catch2/catch.hpp>
+#include <limits>
 
 #include <oneapi/tbb/global_control.h>
 #include <Eigen/Dense>
+#include <catch2/catch.hpp>
 
 #include "runtime/render/gradients/gradient_integrator.h"
 #include "runtime/render/gradients/half_vector.h"
@@ -78,6 +79,15 @@ Eigen::VectorXd denseSolution(const Image& pixels, const Image& dx, const Image&
 }
 
 }  // namespace
+
+TEST_CASE("gradients: densities whose squares overflow give finite differences") {
+  const float infinite = std::numeric_limits<float>::infinity();
+  const Contribution base(Rgb::Constant(2), 1, 2);
+  for (const bool sameShift : {true, false}) {
+    CHECK((weightedDifference(base, Contribution(Rgb::Constant(1e30f), infinite, infinite), sameShift) == 0).all());
+    CHECK((weightedDifference(Contribution(Rgb::Constant(2), 1, infinite), base, sameShift) == 0).all());
+  }
+}
 
 TEST_CASE("gradients: a copied half vector has the Jacobian of finite differences and is its own inverse") {
   CHECK(checkHalfVectors(true, 1) > 300);

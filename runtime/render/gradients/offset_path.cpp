@@ -51,6 +51,8 @@ void OffsetPath::scale(const Rgb& contribution, float density) {
 Rgb weightedDifference(const Contribution& base, const std::optional<Contribution>& offset, bool sameShift) {
   const bool paired = offset && offset->value.maxCoeff() > 0.0f && (sameShift || offset->own2 > 0.0f);
   if (!paired) return base.value * base.misWeight();
+  // Squared densities overflow where the other techniques find such paths practically always.
+  if (!std::isfinite(base.total2) || !std::isfinite(offset->total2)) return Rgb::Zero();
   if (sameShift) return (base.value - offset->value) / (base.total2 + offset->total2);
   return (base.value * base.misWeight() - offset->value * offset->misWeight()) / (1.0f + offset->own2);
 }
