@@ -36,7 +36,7 @@ RayCamera cameraOf(int width, int height) {
 TEST_CASE("pilot: variance and cost of integrators are those of their samples") {
   const Noisy little(0.3f, 4), much(0.9f, 1);
   const std::array<const Integrator*, 2> both{&little, &much};
-  const auto results = comparePilots(cameraOf(160, 90), both, {.samples = 8, .seed = 3});
+  const auto results = comparePilots(cameraOf(160, 90), both, {.tiles = 128, .samples = 8, .seed = 3});
   REQUIRE(results.size() == 2);
   // A mean of 8 uniform numbers has variance noise² / 24; the squared mean is 1 + ¼. The worst pixels are left out.
   CHECK(results[0].variance == Approx(0.09 / 24 / 1.25).epsilon(0.1));
