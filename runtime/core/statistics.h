@@ -1,8 +1,10 @@
 #pragma once
-// Order statistics of small samples.
+// Order statistics of samples.
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -20,6 +22,16 @@ inline double quantile(std::vector<double> values, double q) {
 
 inline double median(std::vector<double> values) {
   return quantile(std::move(values), 0.5);
+}
+
+/// The mean without the largest values: without this fraction of them, in [0, 1), rounded down. NaN if there are no
+/// values.
+inline double trimmedMean(std::vector<double> values, double fraction) {
+  if (values.empty()) return NAN;
+  std::ranges::sort(values);
+  const std::size_t kept = values.size() - static_cast<std::size_t>(fraction * static_cast<double>(values.size()));
+  return std::accumulate(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(kept), 0.0) /
+         static_cast<double>(kept);
 }
 
 }  // namespace lobe

@@ -51,6 +51,13 @@ TEST_CASE("core: quantiles interpolate between the nearest values") {
   CHECK(std::isnan(median({})));
 }
 
+TEST_CASE("statistics: a trimmed mean leaves out the largest values") {
+  CHECK(trimmedMean({100, 1, 3, 2}, 0.25) == Approx(2));
+  CHECK(trimmedMean({100, 1, 3, 2}, 0.24) == Approx(26.5));
+  CHECK(trimmedMean({5}, 0.9) == Approx(5));
+  CHECK(std::isnan(trimmedMean({}, 0.1)));
+}
+
 TEST_CASE("core: errors name what is not a regular file") {
   const auto message = [](const std::filesystem::path& path) -> std::string {
     try {

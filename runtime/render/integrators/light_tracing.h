@@ -11,9 +11,8 @@
 //     void arrive(Weight& weight, const Ray& ray, const SurfaceHit& hit, int depth) const;   // before it scatters
 //     void scatter(Weight& weight, const SurfaceHit& hit, const Vec3& direction, float pdf) const;
 //     void scatterDelta(Weight& weight, const SurfaceHit& hit, const Vec3& direction, float eta) const;
-//     // The squared density of light tracing relative to that of the path: of emission that it has found on a surface
-//     or
-//     // in the environment along a ray, and of light that next-event estimation has found.
+//     // The squared density of light tracing relative to that of the path: of emission that it has found on a
+//     // surface, or in the environment along a ray, and of light that next-event estimation has found.
 //     float atLight(const Weight& weight, const SurfaceHit& hit) const;
 //     float atEnvironment(const Weight& weight, const Ray& ray) const;
 //     float ofNextEvent(const Weight& weight, const SurfaceHit& hit, const LightSample& light,

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
 
 #include "runtime/core/colour.h"
 #include "runtime/core/parallel.h"
@@ -69,15 +68,6 @@ PixelPair renderPair(const RayCamera& camera, const Integrator& integrator, std:
   return pair;
 }
 
-/// The mean without the largest values.
-double trimmedMean(std::vector<double> values) {
-  std::ranges::sort(values);
-  const auto kept = std::max<std::size_t>(
-      1, values.size() - static_cast<std::size_t>(kOutliers * static_cast<double>(values.size())));
-  return std::accumulate(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(kept), 0.0) /
-         static_cast<double>(kept);
-}
-
 }  // namespace
 
 std::vector<PilotResult> comparePilots(const RayCamera& camera, std::span<const Integrator* const> integrators,
@@ -106,7 +96,7 @@ std::vector<PilotResult> comparePilots(const RayCamera& camera, std::span<const 
       variances[i] = square > 0 ? 0.5 * difference * difference / square : 0;
       result.cost += ofIntegrator[i].cost / static_cast<double>(count);
     }
-    result.variance = trimmedMean(std::move(variances));
+    result.variance = trimmedMean(std::move(variances), kOutliers);
     results.push_back(result);
   }
   return results;

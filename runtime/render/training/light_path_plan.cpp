@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 
 #include "runtime/core/colour.h"
 #include "runtime/core/parallel.h"
@@ -79,15 +78,6 @@ BlockValues valuesOf(const std::vector<Chunk>& chunks, std::size_t blocks) {
   return values;
 }
 
-/// The mean without the largest values.
-double trimmedMean(std::vector<double> values) {
-  std::ranges::sort(values);
-  const auto kept = std::max<std::size_t>(
-      1, values.size() - static_cast<std::size_t>(kOutliers * static_cast<double>(values.size())));
-  return std::accumulate(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(kept), 0.0) /
-         static_cast<double>(kept);
-}
-
 /// Traces equally many camera paths and light paths, one per pixel.
 std::vector<Chunk> trace(const RenderScene& scene, const RayCamera& camera, const PathOptions& options,
                          const GuidedSampler& guide, const LightTracing& tracing, const Blocks& blocks, int paths,
@@ -118,7 +108,7 @@ double trimmedVariance(const std::vector<Chunk>& chunks, const BlockValues& valu
       const double square = values.squares[sample.block];
       deviations.push_back(square > 0 ? squared(sample.radiance - values.means[sample.block]) / square : 0);
     }
-  return trimmedMean(std::move(deviations));
+  return trimmedMean(std::move(deviations), kOutliers);
 }
 
 /// Adds the moments of a contribution, made with one light path per pixel, to a trial with another number. scale: the
