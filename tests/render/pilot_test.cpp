@@ -25,6 +25,19 @@ class Noisy : public Integrator {
   int segments_;
 };
 
+/// Noise in the right quarter of the image only.
+class NoisyAtTheRight : public Integrator {
+ public:
+  explicit NoisyAtTheRight(float firstX) : firstX_(firstX) {}
+  Rgb radiance(const Ray& ray, Sampler& rng, PathStatistics&) const override {
+    const bool noisy = ray.direction.x() / ray.direction.z() < firstX_;
+    return Rgb::Constant(1 + (noisy ? 2 * rng.uniform() - 1 : 0));
+  }
+
+ private:
+  float firstX_;  // of the direction at distance 1
+};
+
 RayCamera cameraOf(int width, int height) {
   Camera camera;
   camera.width = width, camera.height = height;
@@ -44,6 +57,17 @@ TEST_CASE("pilot: variance and cost of integrators are those of their samples") 
   CHECK(results[0].cost == Approx(4));
   CHECK(results[1].cost == Approx(1));
   CHECK(results[0].inefficiency() < results[1].inefficiency());
+}
+
+TEST_CASE("pilot: pixels are spread over the columns of the image") {
+  // The right quarter begins where x is half the width from the centre. The camera looks along +z, with x to the left.
+  const RayCamera camera = cameraOf(256, 256);
+  const Vec3 edge = camera.rayThrough(Vec2(192, 128)).direction;
+  const NoisyAtTheRight noisy(edge.x() / edge.z());
+  const std::array<const Integrator*, 1> one{&noisy};
+  const auto results = comparePilots(camera, one, {.tiles = 128, .samples = 32, .seed = 5});
+  // The mean of 32 uniform numbers has variance 1 / 96; the squared mean is 1 + ¼. The worst pixels are left out.
+  CHECK(results[0].variance == Approx(0.25 / 96 / 1.25).epsilon(0.25));
 }
 
 TEST_CASE("pilot: works for images smaller than a tile, and for black ones") {

@@ -18,36 +18,45 @@ constexpr std::uint64_t kTag = 0x70696c6f74;
 constexpr double kDark = 0.5;
 constexpr double kOutliers = 0.005;
 
-/// Tiles that are spread over an image, in the order of its tiles by rows.
+/// Tiles that are spread over an image.
 class Tiling {
  public:
-  Tiling(const RayCamera& camera, int most)
+  Tiling(const RayCamera& camera, const PilotOptions& options)
       : width_(camera.width()), size_(std::min({kSize, camera.width(), camera.height()})) {
-    columns_ = width_ / size_;
-    all_ = static_cast<std::size_t>(columns_) * static_cast<std::size_t>(camera.height() / size_);
-    tiles_ = std::min(all_, static_cast<std::size_t>(most));
+    const int columns = width_ / size_, rows = camera.height() / size_;
+    if (static_cast<std::int64_t>(columns) * rows <= options.tiles) {
+      for (int row = 0; row < rows; ++row)
+        for (int column = 0; column < columns; ++column) tiles_.push_back({column * size_, row * size_});
+      return;
+    }
+    for (int i = 0; i < options.tiles; ++i) {
+      const Eigen::Vector2f u = Sampler::stratified(options.seed, kTag, static_cast<std::uint32_t>(i)).stratified2();
+      tiles_.push_back({static_cast<int>(u.x() * static_cast<float>(columns)) * size_,
+                        static_cast<int>(u.y() * static_cast<float>(rows)) * size_});
+    }
   }
-  std::size_t tiles() const { return tiles_; }
+  std::size_t tiles() const { return tiles_.size(); }
   std::size_t pixelsPerTile() const { return static_cast<std::size_t>(size_) * static_cast<std::size_t>(size_); }
   /// The index in the image of pixel i, which belongs to tile i / pixelsPerTile().
   std::uint64_t pixel(std::size_t i) const {
-    const std::size_t tile = i / pixelsPerTile() * all_ / tiles_;
+    const auto [left, top] = tiles_[i / pixelsPerTile()];
     const int within = static_cast<int>(i % pixelsPerTile());
-    const int column = static_cast<int>(tile % static_cast<std::size_t>(columns_)) * size_ + within % size_;
-    const int row = static_cast<int>(tile / static_cast<std::size_t>(columns_)) * size_ + within / size_;
-    return static_cast<std::uint64_t>(row) * static_cast<std::uint64_t>(width_) + static_cast<std::uint64_t>(column);
+    return static_cast<std::uint64_t>(top + within / size_) * static_cast<std::uint64_t>(width_) +
+           static_cast<std::uint64_t>(left + within % size_);
   }
 
  private:
-  static constexpr int kSize = 4;
-  int width_, size_, columns_;
-  std::size_t all_, tiles_;
+  static constexpr int kSize = 2;
+  int width_, size_;
+  std::vector<std::array<int, 2>> tiles_;  // left, top
 };
 
+using Radiance = Eigen::Array3d;
+
 struct PixelPair {
-  std::array<double, 2> means{};
+  std::array<Radiance, 2> means{Radiance::Zero(), Radiance::Zero()};
   double cost = 0;
-  double mean() const { return 0.5 * (means[0] + means[1]); }
+  Radiance mean() const { return 0.5 * (means[0] + means[1]); }
 };
 
 PixelPair renderPair(const RayCamera& camera, const Integrator& integrator, std::uint64_t pixel,
@@ -61,7 +70,7 @@ PixelPair renderPair(const RayCamera& camera, const Integrator& integrator, std:
     for (int s = 0; s < options.samples; ++s) {
       Sampler rng = Sampler::stratified(seed, pixel, static_cast<std::uint32_t>(s));
       const Ray ray = camera.sample(static_cast<int>(pixel % width), static_cast<int>(pixel / width), rng);
-      pair.means[picture] += luminance(integrator.radiance(ray, rng, statistics)) / options.samples;
+      pair.means[picture] += integrator.radiance(ray, rng, statistics).cast<double>() / options.samples;
     }
   }
   pair.cost = (options.timed ? watch.seconds() : statistics.cost()) / (2.0 * options.samples);
@@ -72,28 +81,29 @@ PixelPair renderPair(const RayCamera& camera, const Integrator& integrator, std:
 
 std::vector<PilotResult> comparePilots(const RayCamera& camera, std::span<const Integrator* const> integrators,
                                        const PilotOptions& options) {
-  const Tiling tiling(camera, options.tiles);
+  const Tiling tiling(camera, options);
   const std::size_t count = tiling.tiles() * tiling.pixelsPerTile();
   std::vector<std::vector<PixelPair>> pairs(integrators.size(), std::vector<PixelPair>(count));
   parallelFor(std::size_t{0}, count, [&](std::size_t i) {
     for (std::size_t k = 0; k < integrators.size(); ++k)
       pairs[k][i] = renderPair(camera, *integrators[k], tiling.pixel(i), options);
   });
-  std::vector<double> tileMeans(tiling.tiles());
+  std::vector<Radiance> tileMeans(tiling.tiles(), Radiance::Zero());
   for (const auto& ofIntegrator : pairs)
     for (std::size_t i = 0; i < count; ++i)
       tileMeans[i / tiling.pixelsPerTile()] +=
           ofIntegrator[i].mean() / static_cast<double>(tiling.pixelsPerTile() * integrators.size());
-  const double dark = kDark * median(tileMeans);
+  std::vector<double> luminances;
+  for (const Radiance& mean : tileMeans) luminances.push_back(luminance(mean.cast<float>().eval()));
+  const double dark = kDark * median(std::move(luminances));
   std::vector<PilotResult> results;
   for (const auto& ofIntegrator : pairs) {
     PilotResult result;
     std::vector<double> variances(count);
     for (std::size_t i = 0; i < count; ++i) {
-      const double difference = ofIntegrator[i].means[0] - ofIntegrator[i].means[1];
-      const double mean = tileMeans[i / tiling.pixelsPerTile()];
-      const double square = mean * mean + dark * dark;
-      variances[i] = square > 0 ? 0.5 * difference * difference / square : 0;
+      const Radiance difference = ofIntegrator[i].means[0] - ofIntegrator[i].means[1];
+      const Radiance square = tileMeans[i / tiling.pixelsPerTile()].square() + dark * dark;
+      variances[i] = (square > 0).select(0.5 * difference.square() / square, 0).mean();
       result.cost += ofIntegrator[i].cost / static_cast<double>(count);
     }
     result.variance = trimmedMean(std::move(variances), kOutliers);
