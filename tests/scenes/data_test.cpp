@@ -55,6 +55,14 @@ TEST_CASE("scenes: the jewelry scene is read") {
   CHECK(scene.filter.kind == PixelFilter::Kind::box);
 }
 
+TEST_CASE("scenes: the rooms are read") {
+  const auto [name, materials] =
+      GENERATE(std::pair{"livingroom", 40u}, std::pair{"kitchen", 20u}, std::pair{"kitchenette", 12u});
+  const Scene scene = readScene(LOBE_SOURCE_DIR "/scenes/" + std::string(name) + ".xml");
+  checkConsistent(scene);
+  CHECK(scene.materials.size() >= materials);
+}
+
 TEST_CASE("scenes: measured materials are read in our own scenes") {
   const char* folder = dataFolder();
   if (!folder) return;
