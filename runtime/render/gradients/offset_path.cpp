@@ -48,13 +48,22 @@ void OffsetPath::scale(const Rgb& contribution, float density) {
   if (!(throughput.maxCoeff() > 0.0f && ratio > 0.0f)) fail();
 }
 
-Rgb weightedDifference(const Contribution& base, const std::optional<Contribution>& offset, bool sameShift) {
-  const bool paired = offset && offset->value.maxCoeff() > 0.0f && (sameShift || offset->own2 > 0.0f);
-  if (!paired) return base.value * base.misWeight();
+Rgb weightedDifference(const Contribution& base, const std::optional<Contribution>& offset) {
+  const bool paired = offset && offset->value.maxCoeff() > 0.0f && offset->group2 > 0.0;
+  if (!paired) return base.weighted();
   // Squared densities overflow where the other techniques find such paths practically always.
   if (!std::isfinite(base.total2) || !std::isfinite(offset->total2)) return Rgb::Zero();
-  if (sameShift) return (base.value - offset->value) / (base.total2 + offset->total2);
-  return (base.value * base.misWeight() - offset->value * offset->misWeight()) / (1.0f + offset->own2);
+  const double ways = base.group2 + offset->group2;
+  return base.value * static_cast<float>(base.group2 / base.total2 / ways) -
+         offset->value * static_cast<float>(offset->group2 / offset->total2 / ways);
+}
+
+Rgb weightedDifference(Contribution base, std::optional<Contribution> offset, bool sameShift) {
+  if (sameShift) {
+    base.group2 = base.total2;
+    if (offset) offset->group2 = offset->total2;
+  }
+  return weightedDifference(base, offset);
 }
 
 }  // namespace lobe

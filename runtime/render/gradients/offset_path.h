@@ -56,7 +56,6 @@ struct OffsetPath {
   float ratio = 1;                ///< density of the offset path · Jacobian / density of the base path, > 0
   Rgb expected = Rgb::Ones();     ///< product of the albedos, for Russian roulette
   float eta2 = 1;                 ///< scaling of radiance by refraction
-  EmissionWeight emissionWeight = {};
 
   bool exists() const { return state != State::failed; }
   /// Whether the vertex has data of its own.
@@ -66,22 +65,25 @@ struct OffsetPath {
   void scale(const Rgb& contribution, float density);
 };
 
-/// What one path of a pair of base and offset path contributes with one technique, next-event estimation or directional
-/// sampling. All densities are relative to that with which the technique has sampled the base path, and include the
-/// Jacobian.
+/// What one path of a pair of base and offset path contributes with one technique, next-event estimation for example.
+/// All densities are relative to that with which the technique has sampled the base path, and include the Jacobian.
 struct Contribution {
-  Rgb value;         ///< contribution · Jacobian / density of the base path
-  float own2 = 1;    ///< squared density of the technique for this path
-  float total2 = 1;  ///< own2 plus the squared density of the other technique
+  Rgb value;          ///< contribution · Jacobian / density of the base path
+  double group2 = 1;  ///< sum of the squared densities of the techniques that shift the path alike, this one included
+  double total2 = 1;  ///< sum of the squared densities of all techniques
 
-  Contribution(const Rgb& radiance, float own2_, float total2_) : value(radiance), own2(own2_), total2(total2_) {}
-  float misWeight() const { return own2 / total2; }
+  /// With a group of its own, with the squared density own2.
+  Contribution(const Rgb& v, double own2, double total) : value(v), group2(own2), total2(total) {}
+  /// The value of a base path with its multiple importance weight.
+  Rgb weighted() const { return value * static_cast<float>(1.0 / total2); }
 };
 
-/// The weighted difference of base and offset path. sameShift: both techniques shift the base path to the same offset
-/// path, so that all four ways of sampling the pair are combined by the power heuristic. Otherwise each technique
-/// estimates the difference of its own part of the pixels, what its multiple importance weight leaves of them. offset:
-/// nullopt if there is none.
-Rgb weightedDifference(const Contribution& base, const std::optional<Contribution>& offset, bool sameShift);
+/// The weighted difference of base and offset path. The techniques that shift the base path to the same offset path
+/// estimate the difference of their common part of the pixels, what their multiple importance weights leave of them:
+/// the ways in which they sample the pair, from both sides, are combined by the power heuristic. offset: nullopt if
+/// there is none.
+Rgb weightedDifference(const Contribution& base, const std::optional<Contribution>& offset);
+/// The same if all techniques are in one group, or each is in its own.
+Rgb weightedDifference(Contribution base, std::optional<Contribution> offset, bool sameShift);
 
 }  // namespace lobe

@@ -30,6 +30,8 @@ namespace lobe {
 
 template <class CameraGuide, class LightGuide>
 class BidirectionalPaths {
+  struct Walk;
+
  public:
   /// All references must outlive it.
   BidirectionalPaths(const RenderScene& scene, const RayCamera& camera, const PathOptions& options,
@@ -42,45 +44,34 @@ class BidirectionalPaths {
   /// a radius.
   void storePhotons(Sampler& lightRng, PathStatistics& statistics, float radius, std::vector<Photon>& photons) {
     merging_ = PhotonGrid::areaOf(radius) * lightPaths();
-    std::vector<Splat> none;
-    Sample sample{lightRng, lightRng, statistics, none};
-    sample.photons = &photons;
-    traceLightPath(sample);
+    LightPath path;
+    traceLightPath(lightRng, statistics, path);
+    for (const LightVertex& v : path.vertices)
+      photons.push_back({v.hit.position, v.hit.normal, v.hit.woWorld, v.throughput, v.weights, v.depth, v.delta});
   }
 
   /// Traces a light path for camera paths that are weighted by the same LightTracing.
   void traceLight(const LightTracing& tracing, Sampler& lightRng, PathStatistics& statistics,
                   std::vector<Splat>& splats) {
     tracing_ = &tracing;
-    Sample sample{lightRng, lightRng, statistics, splats};
-    traceLightPath(sample);
+    LightPath path;
+    traceLightPath(lightRng, statistics, path);
+    connectToCamera(path, statistics, splats);
   }
 
   /// See BidirectionalIntegrator.
   Rgb radiance(const Ray& cameraRay, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
                std::vector<Splat>& splats) const {
-    Sample sample{rng, lightRng, statistics, splats};
     ++statistics.paths;
-    traceLightPath(sample);
+    Sample sample{rng, statistics};
+    traceLightPath(lightRng, statistics, sample.light);
+    connectToCamera(sample.light, statistics, splats);
     traceCameraPath(sample, cameraRay);
     return sample.found.limited(options_.fireflyLimit, statistics.cut);
   }
 
- private:
-  /// A subpath that is being traced.
-  struct Walk {
-    Ray ray;
-    Rgb throughput;
-    PartialWeights weights;
-    LightSelection nextEvent = {};  // at the last vertex of a camera path
-    int depth = 0;
-    float eta2 = 1;                         // as in PathLoop; 1 on light paths
-    Rgb expected = Rgb::Ones();             // as in PathLoop
-    float start = 1;                        // largest component of the first throughput
-    const EmittedPhoton* photon = nullptr;  // at the start of a light path
-    bool delta = false;         // the vertex next to the light, as far as it is known, scatters by a delta component
-    LightPassage passage = {};  // of a light path
-  };
+  // ---- What gradient-domain rendering uses to connect pairs of paths. Densities and values are those of single
+  // techniques, without multiple importance weights.
 
   /// A vertex with a non-delta component. throughput: without the BSDF at this vertex; on light paths the flux.
   template <class Guide>
@@ -92,6 +83,8 @@ class BidirectionalPaths {
           depth(walk.depth),
           smooth(fraction),
           delta(walk.delta),
+          arrivalPdf(walk.pdf),
+          survival(walk.survival),
           sampler(guide, hit) {}
     Vertex(const Vertex&) = delete;
     Vertex& operator=(const Vertex&) = delete;
@@ -102,23 +95,20 @@ class BidirectionalPaths {
     SurfaceHit hit;
     Rgb throughput;
     PartialWeights weights;
-    int depth;     // segments from the origin of the subpath
-    float smooth;  // probability of sampling the non-delta component
-    bool delta;    // Walk::delta
+    int depth;         // segments from the origin of the subpath
+    float smooth;      // probability of sampling the non-delta component
+    bool delta;        // Walk::delta
+    float arrivalPdf;  // Walk::pdf
+    float survival;    // Walk::survival
     typename Guide::Vertex sampler;
   };
   using CameraVertex = Vertex<CameraGuide>;
   using LightVertex = Vertex<LightGuide>;
 
-  struct Sample {
-    Sampler& rng;
-    Sampler& lightRng;  // of the light path, so that the stratified numbers are left to the camera path
-    PathStatistics& statistics;
-    std::vector<Splat>& splats;
-    FoundLight found = {};
-    Vec2 lens = Vec2::Zero();  // point of the lens to which the light path is connected
-    std::deque<LightVertex> lightPath = {};
-    std::vector<Photon>* photons = nullptr;  // if set, the light path is only stored there
+  struct LightPath {
+    Vec2 lens = Vec2::Zero();  ///< point of the lens to which the path is connected
+    std::optional<EmittedPhoton> photon = {};
+    std::deque<LightVertex> vertices = {};
   };
 
   /// Light paths of a sample of the image.
@@ -126,41 +116,176 @@ class BidirectionalPaths {
     return static_cast<double>(camera_.width()) * camera_.height() * (tracing_ ? tracing_->pathsPerPixel : 1.0);
   }
 
-  // ---- Light path
-
-  void traceLightPath(Sample& sample) const {
+  /// Traces a light path. Its random numbers are apart from those of the camera path, to which the stratified ones are
+  /// left.
+  void traceLightPath(Sampler& rng, PathStatistics& statistics, LightPath& path) const {
     if (scene_.lights.empty() || options_.maxDepth < 2) return;
-    if (camera_.hasLens()) sample.lens = squareToDisk(sample.lightRng.uniform2());
-    const double choice = sample.lightRng.uniformDouble();
-    const Vec2 u1 = sample.lightRng.uniform2();
-    const Vec2 u2 = sample.lightRng.uniform2();
-    const std::optional<EmittedPhoton> photon =
-        tracing_ ? tracing_->emission.sample(choice, u1, u2) : scene_.lights.samplePhoton(choice, u1, u2);
+    if (camera_.hasLens()) path.lens = squareToDisk(rng.uniform2());
+    const double choice = rng.uniformDouble();
+    const Vec2 u1 = rng.uniform2();
+    const Vec2 u2 = rng.uniform2();
+    path.photon = tracing_ ? tracing_->emission.sample(choice, u1, u2) : scene_.lights.samplePhoton(choice, u1, u2);
+    const std::optional<EmittedPhoton>& photon = path.photon;
     if (!photon || !(photon->density > 0.0f) || !(photon->power.maxCoeff() > 0.0f)) return;
-    std::optional<SurfaceHit> hit = trace(sample, photon->ray);
-    if (!hit) return;
     Walk walk{photon->ray, photon->power,
-              PartialWeights::fromLight(1, photon->density, photon->cosine(), photon->delta, merging_)};
+              PartialWeights::fromLight(1, photon->density, photon->cosine(), photon->delta, merging_), rng,
+              statistics};
     walk.start = photon->power.maxCoeff();
     walk.photon = &*photon;
+    std::optional<SurfaceHit> hit = trace(walk);
     // The last segment of a path of maximum length is a connection.
-    while (hit && ++walk.depth < options_.maxDepth && advanceLightPath(sample, walk, *hit))
-      hit = trace(sample, walk.ray);
+    while (hit && ++walk.depth < options_.maxDepth && advanceLightPath(path, walk, *hit)) hit = trace(walk);
   }
 
-  bool advanceLightPath(Sample& sample, Walk& walk, const SurfaceHit& hit) const {
-    if (!arrive(walk, hit) || !survives(sample.lightRng, walk)) return false;
+  /// The connection of a light vertex to the camera.
+  struct ViewedVertex {
+    CameraView view;
+    SurfaceHit seen;  ///< the vertex as the camera sees it
+    Rgb value;
+    float density;  ///< of camera rays over the area of the surface
+    double others;  ///< Splat::others
+  };
+  /// nullopt: it contributes nothing.
+  std::optional<ViewedVertex> viewed(const LightVertex& vertex, const Vec2& lens, PathStatistics& statistics) const {
+    std::optional<CameraView> view = camera_.view(vertex.hit.position, lens);
+    if (!view) return std::nullopt;
+    const Vec3 direction = -view->ray.direction;
+    const SurfaceHit seen = asSeenFrom(scene_.scene, vertex.hit, direction);
+    const Rgb scattered = evalAdjointBsdf(vertex.hit, seen);
+    if (!(scattered.maxCoeff() > 0.0f)) return std::nullopt;
+    ++statistics.shadowRays;
+    if (!scene_.visibleToCamera(vertex.hit, view->ray, options_.emitterVisibility)) return std::nullopt;
+    const float density = view->density * std::abs(vertex.hit.normal.dot(direction));
+    const double others =
+        squared(density / lightPaths()) * vertex.weights.with(pdfFrom(cameraGuide_, seen, vertex.hit));
+    const Rgb value = vertex.throughput * scattered * static_cast<float>(density / lightPaths());
+    return ViewedVertex{*view, seen, value, density, others};
+  }
+
+  /// The connection of a vertex of a camera path with one of a light path.
+  struct Connection {
+    Rgb value;        ///< without the throughput of the camera path
+    SurfaceHit seen;  ///< the light vertex as the camera path sees it
+    // Sums of squared densities relative to the connection's: of the techniques with more vertices on the camera path;
+    // and of those with fewer, without the factor PartialWeights::with(reverse) of the camera path.
+    double longer, shorter;
+    float reverse;
+
+    /// The sum over all techniques, this one included, whose shorter camera paths are in `camera`.
+    double total(const PartialWeights& camera) const { return 1.0 + longer + shorter * camera.with(reverse); }
+  };
+  /// hit: the vertex of the camera path, where sampler samples the non-delta component, with the probability `smooth`.
+  /// statistics: count the shadow ray; nullptr: they are known to see each other. nullopt: it contributes nothing.
+  std::optional<Connection> connection(const SurfaceHit& hit, const typename CameraGuide::Vertex& sampler, float smooth,
+                                       const LightVertex& light, PathStatistics* statistics) const {
+    const Vec3 between = light.hit.position - hit.position;
+    const float distance2 = between.squaredNorm();
+    if (!(distance2 > 0.0f)) return std::nullopt;
+    const Vec3 direction = between / std::sqrt(distance2);
+    const Vec3 wi = hit.frame.toLocal(direction);
+    if (!sidesAgree(hit, direction, wi)) return std::nullopt;
+    const Rgb f = evalBsdf(hit, wi);
+    if (!(f.maxCoeff() > 0.0f)) return std::nullopt;
+    const SurfaceHit seen = asSeenFrom(scene_.scene, light.hit, -direction);
+    const Rgb scattered = evalAdjointBsdf(light.hit, seen);
+    if (!(scattered.maxCoeff() > 0.0f)) return std::nullopt;
+    if (statistics) {
+      ++statistics->shadowRays;
+      if (!scene_.visible(hit, light.hit)) return std::nullopt;
+    }
+    // Densities over the area of the vertex at the other end.
+    const float toLight = std::abs(light.hit.normal.dot(direction)) / distance2;
+    const float toCamera = std::abs(hit.normal.dot(direction)) / distance2;
+    const SurfaceHit fromLight = asSeenFrom(scene_.scene, hit, direction);
+    return Connection{
+        f * scattered * light.throughput * (std::abs(wi.z()) * toLight), seen,
+        squared(smooth * sampler.pdf(wi) * toLight) * light.weights.with(pdfFrom(cameraGuide_, seen, light.hit)),
+        squared(light.pdf(-direction) * toCamera), pdfFrom(lightGuide_, fromLight, hit)};
+  }
+
+  /// The connection of a vertex of a camera path with a point of a light.
+  struct LightConnection {
+    Vec3 wi;          ///< local in the frame of the vertex
+    Rgb value;        ///< times the density of the point, without the throughput of the camera path
+    double density;   ///< of the point, as LightSelection::pdf of a photon
+    double hits;      ///< density with which the camera path finds the light
+    double emission;  ///< with which a light path arrives, without the squared factor PartialWeights::with(reverse)
+    float reverse;
+
+    /// The sum of the squared densities of all techniques whose shorter camera paths are in `camera`.
+    double total(const PartialWeights& camera) const {
+      return squared(density) + squared(hits) + squared(emission) * camera.with(reverse);
+    }
+  };
+  /// As `connection`, for a light sample.
+  std::optional<LightConnection> lightConnection(const SurfaceHit& hit, const typename CameraGuide::Vertex& sampler,
+                                                 float smooth, const LightSample& light,
+                                                 PathStatistics* statistics) const {
+    const Vec3 wi = hit.frame.toLocal(light.wi);
+    if (!sidesAgree(hit, light.wi, wi)) return std::nullopt;
+    const Rgb f = evalBsdf(hit, wi);
+    if (!(f.maxCoeff() > 0.0f)) return std::nullopt;
+    if (statistics) {
+      ++statistics->shadowRays;
+      if (!scene_.visible(hit, light)) return std::nullopt;
+    }
+    const bool onSurface = light.source && !light.delta;
+    const double cosineAtLight = onSurface ? std::abs(light.source->normal.dot(light.wi)) : 1.0f;
+    // A point light has a density over solid angle in the sense of LightSelection::pdf.
+    const double unit = light.delta && light.source ? squared(light.distance) : 1.0;
+    const double emission = scene_.lights.photonDensity(light) * std::abs(hit.normal.dot(light.wi)) / cosineAtLight;
+    const SurfaceHit seen = asSeenFrom(scene_.scene, hit, light.wi);
+    return LightConnection{wi,
+                           f * light.radiance * static_cast<float>(std::abs(wi.z()) * unit),
+                           light.pdf * unit,
+                           light.delta ? 0.0 : smooth * sampler.pdf(wi),
+                           emission,
+                           pdfFrom(lightGuide_, seen, hit)};
+  }
+
+  /// The density with which paths of a guide that arrive along seen.wo continue along hit.wo; both are the same point.
+  template <class Guide>
+  static float pdfFrom(const Guide& guide, const SurfaceHit& seen, const SurfaceHit& hit) {
+    return reversePdf(guide, seen, hit);
+  }
+
+ private:
+  /// A subpath that is being traced.
+  struct Walk {
+    Ray ray;
+    Rgb throughput;
+    PartialWeights weights;
+    Sampler& rng;
+    PathStatistics& statistics;
+    LightSelection nextEvent = {};  // at the last vertex of a camera path
+    int depth = 0;
+    float eta2 = 1;                         // as in PathLoop; 1 on light paths
+    Rgb expected = Rgb::Ones();             // as in PathLoop
+    float start = 1;                        // largest component of the first throughput
+    const EmittedPhoton* photon = nullptr;  // at the start of a light path
+    bool delta = false;         // the vertex next to the light, as far as it is known, scatters by a delta component
+    LightPassage passage = {};  // of a light path
+    float pdf = 1;       // over solid angle, of the direction of the ray; 0: of a delta component; 1 at the origin
+    float survival = 1;  // probability of surviving Russian roulette at the last vertex
+  };
+
+  struct Sample {
+    Sampler& rng;
+    PathStatistics& statistics;
+    FoundLight found = {};
+    LightPath light = {};
+  };
+
+  // ---- Light path
+
+  bool advanceLightPath(LightPath& path, Walk& walk, const SurfaceHit& hit) const {
+    if (!arrive(walk, hit) || !survives(walk)) return false;
     const float delta = hit.bsdf->deltaProbability(hit.wo, hit.uv);
     const bool ends = walk.depth + 1 >= options_.maxDepth;
-    if (delta >= 1.0f) return !ends && scatterDelta<Transport::flux>(sample, walk, hit, delta);
+    if (delta >= 1.0f) return !ends && scatterDelta<Transport::flux>(walk, hit, delta);
     const PartialWeights weights = walk.passage.specular ? withNextEvent(walk, hit) : walk.weights;
-    const LightVertex& vertex = sample.lightPath.emplace_back(lightGuide_, hit, walk, weights, 1.0f - delta);
-    if (sample.photons)
-      sample.photons->push_back(
-          {hit.position, hit.normal, hit.woWorld, walk.throughput, weights, walk.depth, walk.delta});
-    else
-      connectToCamera(sample, vertex);
-    return !ends && scatter<Transport::flux>(sample, walk, vertex, delta);
+    const LightVertex& vertex = path.vertices.emplace_back(lightGuide_, hit, walk, weights, 1.0f - delta);
+    return !ends && scatter<Transport::flux>(walk, vertex, delta);
   }
 
   /// The weights at a vertex up to which light has met delta components only. Next-event estimation there has the same
@@ -177,24 +302,17 @@ class BidirectionalPaths {
     return weights;
   }
 
-  void connectToCamera(Sample& sample, const LightVertex& vertex) const {
-    const std::optional<CameraView> view = camera_.view(vertex.hit.position, sample.lens);
-    if (!view) return;
-    const Vec3 direction = -view->ray.direction;
-    const SurfaceHit seen = asSeenFrom(scene_.scene, vertex.hit, direction);
-    const Rgb scattered = evalAdjointBsdf(vertex.hit, seen);
-    if (!(scattered.maxCoeff() > 0.0f)) return;
-    ++sample.statistics.shadowRays;
-    if (!scene_.visibleToCamera(vertex.hit, view->ray, options_.emitterVisibility)) return;
-    const float density = view->density * std::abs(vertex.hit.normal.dot(direction));  // over area of the surface
-    const double others =
-        squared(density / lightPaths()) * vertex.weights.with(pdfFrom(cameraGuide_, seen, vertex.hit));
-    const double weight = 1.0 / (1.0 + others);
-    const Rgb value = vertex.throughput * scattered * static_cast<float>(density * weight / lightPaths());
-    const PathKind kind{Technique::lightTracing, vertex.depth + 1, vertex.delta};
-    sample.statistics.largest.add(luminance(value), kind);
-    sample.splats.push_back(
-        {view->film, FoundLight::limited(value, kind.segments, options_.fireflyLimit, sample.statistics.cut), others});
+  void connectToCamera(const LightPath& path, PathStatistics& statistics, std::vector<Splat>& splats) const {
+    for (const LightVertex& vertex : path.vertices) {
+      const std::optional<ViewedVertex> viewedVertex = viewed(vertex, path.lens, statistics);
+      if (!viewedVertex) continue;
+      const double others = viewedVertex->others;
+      const Rgb value = viewedVertex->value * static_cast<float>(1.0 / (1.0 + others));
+      const PathKind kind{Technique::lightTracing, vertex.depth + 1, vertex.delta};
+      statistics.largest.add(luminance(value), kind);
+      splats.push_back({viewedVertex->view.film,
+                        FoundLight::limited(value, kind.segments, options_.fireflyLimit, statistics.cut), others});
+    }
   }
 
   // ---- Camera path
@@ -207,27 +325,27 @@ class BidirectionalPaths {
       return;
     }
     if (!dark) contribute(sample, emittedRadiance(*hit), {Technique::emission, 1, false});
-    Walk walk{ray, Rgb::Ones(),
-              PartialWeights::fromCamera(camera_.density(ray, hit->distance), lightPaths(), merging_)};
+    Walk walk{ray, Rgb::Ones(), PartialWeights::fromCamera(camera_.density(ray, hit->distance), lightPaths(), merging_),
+              sample.rng, sample.statistics};
     while (hit && ++walk.depth < options_.maxDepth && advanceCameraPath(sample, walk, *hit)) {
-      hit = trace(sample, walk.ray);
+      hit = trace(walk);
       addEmission(sample, walk, hit);
     }
   }
 
   bool advanceCameraPath(Sample& sample, Walk& walk, const SurfaceHit& hit) const {
-    if (!arrive(walk, hit) || !survives(sample.rng, walk)) return false;
+    if (!arrive(walk, hit) || !survives(walk)) return false;
     walk.nextEvent = scene_.lights.at(hit);
     const float delta = hit.bsdf->deltaProbability(hit.wo, hit.uv);
-    if (delta >= 1.0f) return scatterDelta<Transport::radiance>(sample, walk, hit, delta);
+    if (delta >= 1.0f) return scatterDelta<Transport::radiance>(walk, hit, delta);
     const CameraVertex vertex(cameraGuide_, hit, walk, walk.weights, 1.0f - delta);
     addDirectLight(sample, vertex, walk.nextEvent);
-    for (const LightVertex& light : sample.lightPath) {
+    for (const LightVertex& light : sample.light.vertices) {
       if (walk.depth + light.depth >= options_.maxDepth) break;
       connect(sample, vertex, light);
     }
     if (photons_) photons_->forEachNear(hit.position, [&](const Photon& photon) { merge(sample, vertex, photon); });
-    return scatter<Transport::radiance>(sample, walk, vertex, delta);
+    return scatter<Transport::radiance>(walk, vertex, delta);
   }
 
   /// Emission that the last segment of a camera path has found, on a surface or in the environment.
@@ -251,56 +369,19 @@ class BidirectionalPaths {
     const double choice = sample.rng.stratifiedDouble();
     const std::optional<LightSample> light = lights.sample(choice, sample.rng.stratified2());
     if (!light) return;
-    const Vec3 wi = hit.frame.toLocal(light->wi);
-    if (!sidesAgree(hit, light->wi, wi)) return;
-    const Rgb f = evalBsdf(hit, wi);
-    if (!(f.maxCoeff() > 0.0f)) return;
-    ++sample.statistics.shadowRays;
-    if (!scene_.visible(hit, *light)) return;
-    const double weight = 1.0 / (1.0 + othersOfDirectLight(vertex, *light));
-    contribute(sample,
-               vertex.throughput * f * light->radiance * static_cast<float>(std::abs(wi.z()) * weight / light->pdf),
+    const std::optional<LightConnection> found =
+        lightConnection(hit, vertex.sampler, vertex.smooth, *light, &sample.statistics);
+    if (!found) return;
+    const double weight = squared(found->density) / found->total(vertex.weights);
+    contribute(sample, vertex.throughput * found->value * static_cast<float>(weight / found->density),
                {Technique::nextEvent, vertex.depth + 1, false});
   }
 
-  /// The sum over all other techniques of their squared densities, relative to next-event estimation.
-  double othersOfDirectLight(const CameraVertex& vertex, const LightSample& light) const {
-    const SurfaceHit& hit = vertex.hit;
-    const bool onSurface = light.source && !light.delta;
-    const double cosineAtLight = onSurface ? std::abs(light.source->normal.dot(light.wi)) : 1.0f;
-    // A point light has a density over solid angle in the sense of LightSelection::pdf.
-    const double density =
-        light.delta && light.source ? static_cast<double>(light.pdf) * squared(light.distance) : light.pdf;
-    const double emission = scene_.lights.photonDensity(light) * std::abs(hit.normal.dot(light.wi)) / cosineAtLight;
-    const SurfaceHit seen = asSeenFrom(scene_.scene, hit, light.wi);
-    const double hits = light.delta ? 0.0 : squared(vertex.pdf(light.wi) / density);
-    return hits + squared(emission / density) * vertex.weights.with(pdfFrom(lightGuide_, seen, hit));
-  }
-
   void connect(Sample& sample, const CameraVertex& vertex, const LightVertex& light) const {
-    const Vec3 between = light.hit.position - vertex.hit.position;
-    const float distance2 = between.squaredNorm();
-    if (!(distance2 > 0.0f)) return;
-    const Vec3 direction = between / std::sqrt(distance2);
-    const Vec3 wi = vertex.hit.frame.toLocal(direction);
-    if (!sidesAgree(vertex.hit, direction, wi)) return;
-    const Rgb f = evalBsdf(vertex.hit, wi);
-    if (!(f.maxCoeff() > 0.0f)) return;
-    const SurfaceHit seen = asSeenFrom(scene_.scene, light.hit, -direction);
-    const Rgb scattered = evalAdjointBsdf(light.hit, seen);
-    if (!(scattered.maxCoeff() > 0.0f)) return;
-    ++sample.statistics.shadowRays;
-    if (!scene_.visible(vertex.hit, light.hit)) return;
-    // Densities over the area of the vertex at the other end.
-    const float toLight = std::abs(light.hit.normal.dot(direction)) / distance2;
-    const float toCamera = std::abs(vertex.hit.normal.dot(direction)) / distance2;
-    const SurfaceHit fromLight = asSeenFrom(scene_.scene, vertex.hit, direction);
-    const double others =
-        squared(vertex.pdf(direction) * toLight) * light.weights.with(pdfFrom(cameraGuide_, seen, light.hit)) +
-        squared(light.pdf(-direction) * toCamera) * vertex.weights.with(pdfFrom(lightGuide_, fromLight, vertex.hit));
-    contribute(sample,
-               vertex.throughput * light.throughput * f * scattered *
-                   static_cast<float>(std::abs(wi.z()) * toLight / (1.0 + others)),
+    const std::optional<Connection> found =
+        connection(vertex.hit, vertex.sampler, vertex.smooth, light, &sample.statistics);
+    if (!found) return;
+    contribute(sample, vertex.throughput * found->value * static_cast<float>(1.0 / found->total(vertex.weights)),
                {Technique::connection, vertex.depth + light.depth + 1, light.delta});
   }
 
@@ -328,9 +409,9 @@ class BidirectionalPaths {
     sample.statistics.largest.add(luminance(value), kind);
   }
 
-  std::optional<SurfaceHit> trace(Sample& sample, const Ray& ray) const {
-    ++sample.statistics.segments;
-    return scene_.tracer.trace(ray);
+  std::optional<SurfaceHit> trace(Walk& walk) const {
+    ++walk.statistics.segments;
+    return scene_.tracer.trace(walk.ray);
   }
 
   /// Updates the weights at a hit; returns false if nothing is scattered there.
@@ -343,30 +424,24 @@ class BidirectionalPaths {
   }
 
   /// Russian roulette by throughput, as in PathLoop.
-  bool survives(Sampler& rng, Walk& walk) const {
+  bool survives(Walk& walk) const {
     if (walk.depth < options_.rouletteDepth) return true;
     const float carried = std::max(walk.throughput.maxCoeff() * walk.eta2 / walk.start, walk.expected.maxCoeff());
-    const float survival = std::min(carried, kMaxSurvival);
-    if (!(rng.uniform() < survival)) return false;
-    walk.throughput /= survival;
+    walk.survival = std::min(carried, kMaxSurvival);
+    if (!(walk.rng.uniform() < walk.survival)) return false;
+    walk.throughput /= walk.survival;
     return true;
-  }
-
-  /// The density with which paths of a guide that arrive along seen.wo continue along hit.wo; both are the same point.
-  template <class Guide>
-  static float pdfFrom(const Guide& guide, const SurfaceHit& seen, const SurfaceHit& hit) {
-    return reversePdf(guide, seen, hit);
   }
 
   /// Scatters a subpath; returns false if it ends.
   template <Transport transport, class Guide>
-  bool scatter(Sample& sample, Walk& walk, const Vertex<Guide>& vertex, float delta) const {
+  bool scatter(Walk& walk, const Vertex<Guide>& vertex, float delta) const {
     const SurfaceHit& hit = vertex.hit;
-    Sampler& rng = rngOf<transport>(sample);
-    if (delta > 0.0f && rng.uniform() < delta) return scatterDelta<transport>(sample, walk, hit, delta);
-    const std::optional<BsdfSample> scattered = vertex.sampler.sample(rng, sample.statistics);
+    if (delta > 0.0f && walk.rng.uniform() < delta) return scatterDelta<transport>(walk, hit, delta);
+    const std::optional<BsdfSample> scattered = vertex.sampler.sample(walk.rng, walk.statistics);
     if (!scattered) return false;
     const float pdf = vertex.smooth * scattered->pdf;
+    walk.pdf = pdf;
     const Vec3 direction = hit.frame.toWorld(scattered->wi).normalized();
     if (!sidesAgree(hit, direction, scattered->wi)) return false;
     const SurfaceHit seen = asSeenFrom(scene_.scene, hit, direction);
@@ -386,11 +461,12 @@ class BidirectionalPaths {
   }
 
   template <Transport transport>
-  bool scatterDelta(Sample& sample, Walk& walk, const SurfaceHit& hit, float fraction) const {
-    sample.statistics.countDelta();
+  bool scatterDelta(Walk& walk, const SurfaceHit& hit, float fraction) const {
+    walk.statistics.countDelta();
+    walk.pdf = 0;
     rememberDelta<transport>(walk, true);
     constexpr bool flux = transport == Transport::flux;
-    const float choice = rngOf<transport>(sample).uniform();
+    const float choice = walk.rng.uniform();
     const std::optional<DeltaSample> scattered = flux ? sampleAdjointDelta(hit, choice) : sampleDelta(hit, choice);
     if (!scattered) return false;
     const Vec3 direction = hit.frame.toWorld(scattered->wi).normalized();
@@ -427,10 +503,6 @@ class BidirectionalPaths {
     return walk.throughput.maxCoeff() > 0.0f;
   }
 
-  template <Transport transport>
-  static Sampler& rngOf(Sample& sample) {
-    return transport == Transport::flux ? sample.lightRng : sample.rng;
-  }
   static float squaredEta(float eta) { return eta * eta; }
 
   const RenderScene& scene_;
