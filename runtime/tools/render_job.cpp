@@ -71,8 +71,8 @@ void RenderJob::validate() const {
   require(reduction >= 0 && std::isfinite(reduction), "--reduction must be a finite number of at least 0");
   require(!outputs.empty(), "-o FILE is required");
   require(!record || guided(), "--record requires --integrator auto, guided or product, or bdpt with --guide");
-  require(!gradients || (integrator != IntegratorKind::bdpt && integrator != IntegratorKind::vcm),
-          "--gradients requires --integrator auto, path, guided or product");
+  require(!gradients || integrator != IntegratorKind::vcm,
+          "--gradients requires --integrator auto, path, bdpt, guided or product");
   require(!gradients || sampleOffset == 0,
           "--gradients cannot be combined with --sample-offset, because a picture is reconstructed as a whole");
   require(!gradients || (checkpoint.empty() && resume.empty()),

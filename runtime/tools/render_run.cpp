@@ -274,7 +274,8 @@ void Run::render() {
   };
   result_ = std::visit(
       [&]<class AnIntegrator>(const std::unique_ptr<AnIntegrator>& integrator) {
-        if constexpr (std::is_same_v<AnIntegrator, GradientIntegrator>)
+        if constexpr (std::is_same_v<AnIntegrator, GradientIntegrator> ||
+                      std::is_same_v<AnIntegrator, BidirectionalGradientIntegrator>)
           return lobe::render(*camera_, *integrator, *gradients_, options(), afterWave, result_);
         else
           return lobe::render(*camera_, *integrator, *film_, options(), afterWave, result_);

@@ -112,6 +112,13 @@ std::unique_ptr<BidirectionalIntegrator> makeBdpt(const RenderJob& job, const Re
   return std::make_unique<GuidedBdptIntegrator>(scene, camera, options, *guiding.sampler, *guiding.lightSampler);
 }
 
+std::unique_ptr<BidirectionalGradientIntegrator> makeBdptGradients(const RenderJob& job, const RenderScene& scene,
+                                                                   const RayCamera& camera, const Guiding& guiding) {
+  const PathOptions options = pathOptions(job, scene.scene);
+  if (!guiding.sampler) return std::make_unique<BdptGradients>(scene, camera, options);
+  return std::make_unique<GuidedBdptGradients>(scene, camera, options, *guiding.sampler, *guiding.lightSampler);
+}
+
 std::unique_ptr<BidirectionalIntegrator> makeVcm(const RenderJob& job, const RenderScene& scene,
                                                  const RayCamera& camera) {
   const float diagonal = scene.tracer.bounds().isEmpty() ? 1.0f : scene.tracer.bounds().diagonal().norm();
@@ -179,6 +186,7 @@ RunSettings settingsOf(const RenderJob& job, const Scene& scene, const Guiding& 
 
 AnyIntegrator makeIntegrator(const RenderJob& job, const RenderScene& scene, const RayCamera& camera,
                              Guiding& guiding) {
+  if (job.integrator == IntegratorKind::bdpt && job.gradients) return makeBdptGradients(job, scene, camera, guiding);
   if (job.integrator == IntegratorKind::bdpt) return makeBdpt(job, scene, camera, guiding);
   if (job.integrator == IntegratorKind::vcm) return makeVcm(job, scene, camera);
   AnyIntegrator integrator = makeUnidirectional(job, scene, camera, guiding);

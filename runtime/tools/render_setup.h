@@ -64,8 +64,9 @@ struct Guiding {
   }
 };
 
-using AnyIntegrator = std::variant<std::unique_ptr<Integrator>, std::unique_ptr<BidirectionalIntegrator>,
-                                   std::unique_ptr<GradientIntegrator>>;
+using AnyIntegrator =
+    std::variant<std::unique_ptr<Integrator>, std::unique_ptr<BidirectionalIntegrator>,
+                 std::unique_ptr<GradientIntegrator>, std::unique_ptr<BidirectionalGradientIntegrator>>;
 
 /// The plan of training for the options.
 TrainingPlan planOf(const RenderJob& job);

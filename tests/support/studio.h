@@ -65,6 +65,7 @@ class Studio {
   const RenderScene& renderScene() const { return *renderScene_; }
   const Scene& scene() const { return scene_; }
   const GuidedSampler& productSampler() const { return *product_; }
+  const GuidedSampler& guidedSampler() const { return *guided_; }
   const GuidedSampler& importanceSampler() const { return *importanceSampler_; }
   const IlluminationCache& illumination() const { return cacheOf(illumination_); }
   const Field& importance() const { return importance_; }

@@ -170,8 +170,8 @@ TEST_CASE("loberender: invalid command lines are errors") {
       {" --spp 1 --integrator vcm --merge-alpha 1.5", "--merge-alpha"},
       {" --spp 1 --integrator vcm --save-illumination a.illum", "bdpt with --guide"},
       {" --spp 1 --gradients l3", "l2, l1"},
-      {" --spp 1 --gradients l2 --integrator bdpt", "--gradients requires --integrator auto, path, guided or product"},
-      {" --spp 1 --gradients l2 --integrator vcm", "--gradients requires --integrator auto, path, guided or product"},
+      {" --spp 1 --gradients l2 --integrator vcm",
+       "--gradients requires --integrator auto, path, bdpt, guided or product"},
       {" --spp 1 --gradients l2 --sample-offset 1", "--gradients cannot be combined with --sample-offset"},
       {" --spp 1 --gradients l2 --checkpoint c", "--gradients cannot be combined with --checkpoint"},
       {" --spp 1 --unknown", "--unknown"}};
@@ -252,7 +252,7 @@ TEST_CASE("loberender: bidirectional pictures do not depend on the number of thr
 
 TEST_CASE("loberender: pictures from gradients do not depend on the number of threads and are not negative") {
   const SceneFolder folder(true);
-  const std::string integrator = GENERATE("path", "guided", "product");
+  const std::string integrator = GENERATE("path", "guided", "product", "bdpt", "bdpt --guide product");
   const std::string norm = GENERATE("l2", "l1");
   const std::string render =
       "loberender scene.xml --spp 4 --seed 9 --integrator " + integrator + " --gradients " + norm + kTraining;

@@ -1,5 +1,6 @@
-// Gradient-domain path tracing estimates the same picture as path tracing: its reconstruction in L2, and the
-// differences of neighbouring pixels, agree with those of path tracing. A wrong density must be detected.
+// Gradient-domain path tracing and bidirectional path tracing estimate the same picture as path tracing: their
+// reconstruction in L2, and the differences of neighbouring pixels, agree with those of path tracing. A wrong density
+// must be detected.
 
 #include <catch2/catch.hpp>
 
@@ -7,14 +8,19 @@
 #include <fstream>
 #include <functional>
 
+#include <oneapi/tbb/global_control.h>
+
+#include "runtime/render/gradients/gradient_bidirectional_path.h"
 #include "runtime/render/gradients/gradient_integrator.h"
 #include "runtime/render/gradients/gradient_path.h"
 #include "tests/support/agreement.h"
+#include "tests/support/batches.h"
 #include "tests/support/studio.h"
 
 using namespace lobe;
 using lobe::test::agree;
 using lobe::test::Block;
+using lobe::test::Stage;
 using lobe::test::Studio;
 
 namespace {
@@ -81,20 +87,26 @@ struct Estimates {
   }
 };
 
-Estimates ofPath(const Studio& studio, int samples) {
+/// Of an integrator without gradients.
+template <class AnyIntegrator>
+Estimates ofPixels(const RayCamera& camera, AnyIntegrator integrator, int samples) {
   Estimates all;
   for (int i = 0; i < kRepetitions; ++i) {
-    const Image image = studio.render(studio.path(), samples, 1000 + i).mean();
+    Film film(camera.width(), camera.height());
+    render(camera, integrator, film, {static_cast<std::uint64_t>(1000 + i), samples, std::nullopt});
+    const Image image = film.mean();
     all.add(image, differences(image, 1, 0), differences(image, 0, 1));
   }
   return all;
 }
 
-Estimates ofGradients(const Studio& studio, const GradientIntegrator& integrator, int samples) {
+template <class AnyIntegrator>
+Estimates ofGradients(const RayCamera& camera, const AnyIntegrator& integrator, int samples) {
   Estimates all;
   for (int i = 0; i < kRepetitions; ++i) {
-    GradientFilm film(studio.camera().width(), studio.camera().height());
-    render(studio.camera(), integrator, film, {static_cast<std::uint64_t>(2000 + i), samples, std::nullopt});
+    GradientFilm film(camera.width(), camera.height());
+    render(camera, integrator, film, {static_cast<std::uint64_t>(2000 + i), samples, std::nullopt});
+    REQUIRE(film.pixels().dropped() == 0);
     // Negative pixels are not clamped, as in the pictures that the tool writes: that would be a bias.
     all.add(reconstruct(film.pixels().mean(), film.dx(), film.dy(), ReconstructionNorm::l2), film.dx(), film.dy());
   }
@@ -106,19 +118,21 @@ bool agree(const Estimates& a, const Estimates& b) {
          agree(a.dy.blocks(), b.dy.blocks());
 }
 
-/// A sampler that reports a density 5 % too high.
+/// A sampler that reports a density too high by a factor.
 struct WrongSampler {
+  float fault = 1.05f;
   class Vertex {
    public:
-    Vertex(const WrongSampler&, const SurfaceHit& hit) : vertex_(BsdfSampler(), hit) {}
+    Vertex(const WrongSampler& sampler, const SurfaceHit& hit) : fault_(sampler.fault), vertex_(BsdfSampler(), hit) {}
     std::optional<BsdfSample> sample(Sampler& rng, PathStatistics& statistics) const {
       auto sample = vertex_.sample(rng, statistics);
-      if (sample) sample->pdf *= 1.05f;
+      if (sample) sample->pdf *= fault_;
       return sample;
     }
-    float pdf(const Vec3& wi) const { return 1.05f * vertex_.pdf(wi); }
+    float pdf(const Vec3& wi) const { return fault_ * vertex_.pdf(wi); }
 
    private:
+    float fault_;
     BsdfSampler::Vertex vertex_;
   };
 };
@@ -144,12 +158,13 @@ void check(const std::string& scene) {
       <transform name="to_world"><lookat origin="0, -6, 3" target="0, 0, 0.6" up="0, 0, 1"/></transform></sensor>)"
                                       << scene << "</scene>";
   const Studio studio(readScene(folder / "scene.xml"), 30, 20);
-  const Estimates path = ofPath(studio, 128);
+  const RayCamera& camera = studio.camera();
+  const Estimates path = ofPixels(camera, studio.path(), 128);
   const PathGradients gradients(studio.renderScene(), studio.camera(), {});
-  CHECK(agree(path, ofGradients(studio, gradients, 32)));
+  CHECK(agree(path, ofGradients(camera, gradients, 32)));
   const GuidedGradients product(studio.renderScene(), studio.camera(), {}, studio.productSampler());
-  CHECK(agree(path, ofGradients(studio, product, 32)));
-  CHECK_FALSE(agree(path, ofGradients(studio, WrongGradients(studio), 32)));
+  CHECK(agree(path, ofGradients(camera, product, 32)));
+  CHECK_FALSE(agree(path, ofGradients(camera, WrongGradients(studio), 32)));
 }
 
 const std::string kLamp = R"(<shape type="rectangle"><transform name="to_world"><scale value="0.8"/>
@@ -209,4 +224,135 @@ TEST_CASE("unbiased: gradients of coated, masked and thin surfaces under an envi
       <transform name="to_world"><rotate x="1" angle="80"/><translate x="1.4" z="1"/></transform>
       <bsdf type="principledthin"><float name="roughness" value="0.3"/><float name="spec_trans" value="0.5"/>
         <float name="diff_trans" value="0.8"/></bsdf></shape>)");
+}
+
+// ---- Bidirectional path tracing
+
+namespace {
+
+Scene smallScene(const std::string& body, const std::string& filter = "box") {
+  const lobe::test::Folder folder;
+  std::ofstream(folder / "scene.xml") << R"(<scene version="3.0.0">
+    <sensor type="perspective"><float name="fov" value="35"/>
+      <transform name="to_world"><lookat origin="0, -6, 3" target="0, 0, 0.6" up="0, 0, 1"/></transform>
+      <film type="hdrfilm"><integer name="width" value="30"/><integer name="height" value="20"/>
+        <rfilter type=")" << filter << R"("/></film></sensor>)"
+                                      << body << "</scene>";
+  return readScene(folder / "scene.xml");
+}
+
+class WrongBdptGradients : public BidirectionalGradientIntegrator {
+ public:
+  WrongBdptGradients(const Stage& stage, float camera, float light) : stage_(stage), camera_{camera}, light_{light} {}
+  GradientSample sample(int x, int y, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
+                        GradientSplats splats) const override {
+    const GradientContext<WrongSampler> context{stage_.ready, stage_.camera, stage_.options, camera_};
+    return GradientBidirectionalPath(context, light_, rng, statistics).trace(x, y, lightRng, splats);
+  }
+
+ private:
+  const Stage& stage_;
+  WrongSampler camera_, light_;
+};
+
+void checkBdpt(Scene scene, int samplesOfPath, int samples) {
+  const Stage stage(std::move(scene));
+  const Estimates gradients =
+      ofGradients(stage.camera, BdptGradients(stage.ready, stage.camera, stage.options), samples);
+  CHECK(agree(ofPixels(stage.camera, stage.bdpt(), 2 * samples), gradients));
+  CHECK(agree(ofPixels(stage.camera, stage.path(), samplesOfPath), gradients));
+}
+
+const std::string kBoxes = kLamp + kWalls + R"(<shape type="cube"><transform name="to_world"><scale value="0.6"/>
+      <rotate z="1" angle="25"/><translate x="-0.8" z="0.6"/></transform>
+      <bsdf type="diffuse"><rgb name="reflectance" value="0.3, 0.8, 0.3"/></bsdf></shape>)";
+
+}  // namespace
+
+TEST_CASE("unbiased: bidirectional gradients of diffuse boxes, and of wrong densities", "[slow][gradients]") {
+  const Stage stage(smallScene(kBoxes));
+  const Estimates path = ofPixels(stage.camera, stage.path(), 64);
+  const auto with = [&](float camera, float light) {
+    return ofGradients(stage.camera, WrongBdptGradients(stage, camera, light), 16);
+  };
+  CHECK(agree(path, with(1, 1)));
+  CHECK_FALSE(agree(path, with(1.1f, 1)));
+  CHECK_FALSE(agree(path, with(1, 1.1f)));
+}
+
+TEST_CASE("unbiased: bidirectional gradients of glossy metal and the caustic of a glass ball", "[slow][gradients]") {
+  checkBdpt(smallScene(R"(<shape type="sphere"><point name="center" x="1.5" y="-0.5" z="3.5"/>
+      <float name="radius" value="0.4"/><emitter type="area"><rgb name="radiance" value="40, 40, 30"/></emitter></shape>
+    <shape type="rectangle"><transform name="to_world"><scale value="4"/></transform>
+      <bsdf type="roughconductor"><string name="distribution" value="ggx"/>
+        <texture type="checkerboard" name="alpha"><float name="uscale" value="6"/><float name="vscale" value="6"/>
+          <rgb name="color0" value="0.15, 0.15, 0.15"/><rgb name="color1" value="0.5, 0.5, 0.5"/></texture></bsdf></shape>
+    <shape type="rectangle"><transform name="to_world"><scale value="4"/><rotate x="1" angle="90"/>
+      <translate y="2" z="1"/></transform><bsdf type="twosided"><bsdf type="diffuse"/></bsdf></shape>
+    <shape type="sphere"><point name="center" x="1" y="0" z="0.9"/><float name="radius" value="0.7"/>
+      <bsdf type="dielectric"/></shape>
+    <shape type="sphere"><point name="center" x="-1" y="0" z="1"/>
+      <bsdf type="roughconductor"><float name="alpha" value="0.01"/></bsdf></shape>
+    <shape type="sphere"><point name="center" x="0" y="-1.2" z="0.5"/><float name="radius" value="0.5"/>
+      <bsdf type="plastic"><rgb name="diffuse_reflectance" value="0.2, 0.3, 0.7"/></bsdf></shape>)"),
+            256, 16);
+}
+
+TEST_CASE("unbiased: bidirectional gradients under an environment, a point and a distant light", "[slow][gradients]") {
+  checkBdpt(smallScene(kWalls + R"(<emitter type="constant"><rgb name="radiance" value="0.4, 0.5, 0.6"/></emitter>
+    <emitter type="directional"><vector name="direction" x="1" y="1" z="-2"/><rgb name="irradiance" value="1, 1, 1"/></emitter>
+    <emitter type="point"><point name="position" x="1" y="-1" z="2.5"/><rgb name="intensity" value="6, 5, 4"/></emitter>
+    <shape type="sphere"><point name="center" x="-1.1" y="0" z="1"/>
+      <bsdf type="roughconductor"><float name="alpha" value="0.2"/></bsdf></shape>
+    <shape type="sphere"><point name="center" x="0.2" y="-1.5" z="0.5"/><float name="radius" value="0.5"/>
+      <bsdf type="roughplastic"><float name="alpha" value="0.2"/></bsdf></shape>
+    <shape type="sphere"><point name="center" x="1.1" y="0" z="1"/>
+      <bsdf type="roughdielectric"><string name="distribution" value="ggx"/><float name="alpha" value="0.3"/></bsdf></shape>)",
+                       "tent"),
+            128, 16);
+}
+
+TEST_CASE("unbiased: bidirectional gradients of coated, masked and mapped surfaces", "[slow][gradients]") {
+  checkBdpt(smallScene(kLamp + R"(<shape type="rectangle"><transform name="to_world"><scale value="4"/></transform>
+      <bsdf type="normalmap"><texture type="checkerboard">
+          <rgb name="color0" value="0.8, 0.5, 0.9"/><rgb name="color1" value="0.3, 0.9, 0.8"/></texture>
+        <bsdf type="roughcoating"><float name="alpha" value="0.2"/>
+          <bsdf type="roughconductor"><float name="alpha" value="0.3"/></bsdf></bsdf></bsdf></shape>
+    <shape type="sphere"><point name="center" x="-1.2" y="0" z="1"/>
+      <bsdf type="coating"><rgb name="sigma_a" value="0.1, 0.3, 0.6"/>
+        <bsdf type="roughplastic"><float name="alpha" value="0.2"/></bsdf></bsdf></shape>
+    <shape type="sphere"><point name="center" x="0.2" y="-1.5" z="0.5"/><float name="radius" value="0.5"/>
+      <bsdf type="mask"><float name="opacity" value="0.6"/><bsdf type="twosided"><bsdf type="diffuse"/></bsdf></bsdf></shape>
+    <shape type="sphere"><point name="center" x="0" y="0.8" z="0.8"/><float name="radius" value="0.8"/>
+      <bsdf type="conductor"/></shape>
+    <shape type="rectangle">
+      <transform name="to_world"><rotate x="1" angle="80"/><translate x="1.4" z="1"/></transform>
+      <bsdf type="principledthin"><float name="roughness" value="0.3"/><float name="spec_trans" value="0.5"/>
+        <float name="diff_trans" value="0.8"/></bsdf></shape>)"),
+            128, 16);
+}
+
+TEST_CASE("unbiased: bidirectional gradients with guided paths", "[slow][gradients]") {
+  const Studio studio(smallScene(kBoxes), 30, 20);
+  const Estimates path = ofPixels(studio.camera(), studio.path(), 64);
+  for (const GuidedSampler* guide : {&studio.productSampler(), &studio.guidedSampler()})
+    CHECK(agree(path, ofGradients(studio.camera(),
+                                  GuidedBdptGradients(studio.renderScene(), studio.camera(), {}, *guide,
+                                                      studio.importanceSampler()),
+                                  8)));
+}
+
+TEST_CASE("unbiased: bidirectional gradients do not depend on the number of threads", "[gradients]") {
+  const Stage stage(smallScene(kBoxes, "gaussian"));
+  const auto renderWith = [&](std::size_t threads) {
+    const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism, threads);
+    GradientFilm film(30, 20);
+    render(stage.camera, BdptGradients(stage.ready, stage.camera, stage.options), film, {1, 4, std::nullopt});
+    return film.reconstruct(ReconstructionNorm::l1).image;
+  };
+  const Image one = renderWith(1), two = renderWith(2), seven = renderWith(7);
+  for (std::size_t i = 0; i < one.pixels.size(); ++i) {
+    REQUIRE((one.pixels[i] == two.pixels[i]).all());
+    REQUIRE((one.pixels[i] == seven.pixels[i]).all());
+  }
 }

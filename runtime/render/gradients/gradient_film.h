@@ -18,6 +18,13 @@ struct GradientSample {
   /// Of the pixel and each neighbour: the part of their difference, pixel minus neighbour, that paths of this pixel
   /// estimate. The expected differences of the pixels a and b are those from a, minus those from b.
   std::array<Rgb, 4> differences{Rgb::Zero(), Rgb::Zero(), Rgb::Zero(), Rgb::Zero()};
+
+  GradientSample operator+(const GradientSample& other) const {
+    GradientSample sum = *this;
+    sum.radiance += other.radiance;
+    for (std::size_t i = 0; i < differences.size(); ++i) sum.differences[i] += other.differences[i];
+    return sum;
+  }
 };
 
 /// An image that is reconstructed from its differences.

@@ -229,18 +229,22 @@ class BidirectionalPaths {
       ++statistics->shadowRays;
       if (!scene_.visible(hit, light)) return std::nullopt;
     }
-    const bool onSurface = light.source && !light.delta;
-    const double cosineAtLight = onSurface ? std::abs(light.source->normal.dot(light.wi)) : 1.0f;
     // A point light has a density over solid angle in the sense of LightSelection::pdf.
     const double unit = light.delta && light.source ? squared(light.distance) : 1.0;
-    const double emission = scene_.lights.photonDensity(light) * std::abs(hit.normal.dot(light.wi)) / cosineAtLight;
     const SurfaceHit seen = asSeenFrom(scene_.scene, hit, light.wi);
     return LightConnection{wi,
                            f * light.radiance * static_cast<float>(std::abs(wi.z()) * unit),
                            light.pdf * unit,
                            light.delta ? 0.0 : smooth * sampler.pdf(wi),
-                           emission,
+                           emissionDensity(hit, light),
                            pdfFrom(lightGuide_, seen, hit)};
+  }
+
+  /// The density with which a light path arrives at a hit from a light sample, in the measure of LightConnection.
+  double emissionDensity(const SurfaceHit& hit, const LightSample& light) const {
+    const bool onSurface = light.source && !light.delta;
+    const double cosineAtLight = onSurface ? std::abs(light.source->normal.dot(light.wi)) : 1.0f;
+    return scene_.lights.photonDensity(light) * std::abs(hit.normal.dot(light.wi)) / cosineAtLight;
   }
 
   /// The density with which paths of a guide that arrive along seen.wo continue along hit.wo; both are the same point.

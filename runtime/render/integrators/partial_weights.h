@@ -31,6 +31,9 @@ class PartialWeights {
     return {squared(lightPaths / density), 0.0, squared(merging)};
   }
 
+  /// No technique at all.
+  static PartialWeights none() { return {0.0, 0.0, 0.0}; }
+
   /// A vertex at the end of a segment. cosine: of the segment, at that vertex. distance: of the segment; 1 for the
   /// first segment of a subpath, because the functions above account for it.
   void arrive(float distance, float cosine) {

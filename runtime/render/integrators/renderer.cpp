@@ -107,18 +107,12 @@ class WaveRenderer {
   Tiles tiles_;
 };
 
-class BidirectionalRenderer {
+/// Renders sample by sample, each of all pixels.
+class ImageRenderer {
  public:
-  BidirectionalRenderer(const RayCamera& camera, BidirectionalIntegrator& integrator, Film& film,
-                        const RenderOptions& options)
-      : camera_(camera),
-        integrator_(integrator),
-        film_(film),
-        stop_(options.stop),
-        tiles_(camera, options),
-        fromCamera_(film.pixels().size()),
-        fromLights_(camera),
-        splats_(tiles_.count()) {}
+  ImageRenderer(const RayCamera& camera, const AddImageSample& addSample, const Film& film,
+                const RenderOptions& options)
+      : addSample_(addSample), film_(film), stop_(options.stop), tiles_(camera, options) {}
 
   /// Adds samples until every pixel has `samples` of them.
   Wave render(int samples) {
@@ -126,52 +120,82 @@ class BidirectionalRenderer {
     for (int s = static_cast<int>(film_.sampleRange().first); s < samples; ++s) {
       wave.complete = !isSet(stop_);
       if (!wave.complete) break;
-      wave.statistics += renderSample(s);
+      wave.statistics += addSample_(OneSample(tiles_, s));
     }
     return wave;
   }
 
  private:
-  PathStatistics renderSample(int s) {
+  class OneSample : public ImageSample {
+   public:
+    OneSample(const Tiles& tiles, int sample) : tiles_(tiles), sample_(sample) {}
+    int index() const override { return static_cast<int>(tiles_.indexOf(sample_)); }
+    int tiles() const override { return tiles_.count(); }
+    PathStatistics forEachPixel(const VisitPixel& visit) const override {
+      return tiles_
+          .render([] { return false; },
+                  [&](int x, int y, int tile, PathStatistics& statistics) {
+                    Sampler rng = tiles_.sampler(x, y, sample_), lightRng = tiles_.lightSampler(x, y, sample_);
+                    visit(x, y, tile, rng, lightRng, statistics);
+                  })
+          .statistics;
+    }
+
+   private:
+    const Tiles& tiles_;
+    int sample_;
+  };
+
+  const AddImageSample& addSample_;
+  const Film& film_;
+  const StopFlag* stop_;
+  Tiles tiles_;
+};
+
+/// Adds samples of a bidirectional integrator to a film.
+class BidirectionalSamples {
+ public:
+  BidirectionalSamples(const RayCamera& camera, BidirectionalIntegrator& integrator, Film& film)
+      : camera_(camera),
+        integrator_(integrator),
+        film_(film),
+        fromCamera_(camera.width(), camera.height()),
+        fromLights_(camera) {}
+
+  PathStatistics add(const ImageSample& sample) {
+    splats_.resize(sample.tiles());
     for (std::vector<Splat>& list : splats_) list.clear();
-    PathStatistics statistics = storeLightPaths(s);
-    statistics += inAllTiles([&](int x, int y, int tile, PathStatistics& counts) {
-      Sampler rng = tiles_.sampler(x, y, s), lightRng = tiles_.lightSampler(x, y, s);
-      const Ray ray = camera_.sample(x, y, rng);
-      fromCamera_[tiles_.pixelOf(x, y)] = integrator_.radiance(ray, rng, lightRng, counts, splats_[tile]);
-    });
+    PathStatistics statistics = storeLightPaths(sample);
+    statistics +=
+        sample.forEachPixel([&](int x, int y, int tile, Sampler& rng, Sampler& lightRng, PathStatistics& counts) {
+          const Ray ray = camera_.sample(x, y, rng);
+          fromCamera_.at(x, y) = integrator_.radiance(ray, rng, lightRng, counts, splats_[tile]);
+        });
     fromLights_.sum(splats_);
     for (int y = 0; y < camera_.height(); ++y)
-      for (int x = 0; x < camera_.width(); ++x)
-        film_.add(x, y, fromCamera_[tiles_.pixelOf(x, y)] + fromLights_.at(x, y));
+      for (int x = 0; x < camera_.width(); ++x) film_.add(x, y, fromCamera_.at(x, y) + fromLights_.at(x, y));
     return statistics;
   }
 
-  PathStatistics storeLightPaths(int s) {
+ private:
+  PathStatistics storeLightPaths(const ImageSample& sample) {
     if (!integrator_.storesLightPaths()) return {};
-    integrator_.beginSample(static_cast<int>(tiles_.indexOf(s)));
-    std::vector<std::vector<Photon>> perTile(tiles_.count());
-    const PathStatistics statistics = inAllTiles([&](int x, int y, int tile, PathStatistics& counts) {
-      Sampler lightRng = tiles_.lightSampler(x, y, s);
-      integrator_.storeLightPath(lightRng, counts, perTile[tile]);
-    });
+    integrator_.beginSample(sample.index());
+    std::vector<std::vector<Photon>> perTile(sample.tiles());
+    const PathStatistics statistics =
+        sample.forEachPixel([&](int, int, int tile, Sampler&, Sampler& lightRng, PathStatistics& counts) {
+          integrator_.storeLightPath(lightRng, counts, perTile[tile]);
+        });
     std::vector<Photon> all;
     for (const std::vector<Photon>& photons : perTile) all.insert(all.end(), photons.begin(), photons.end());
     integrator_.mergeWith(all);
     return statistics;
   }
 
-  template <class RenderPixel>
-  PathStatistics inAllTiles(const RenderPixel& renderPixel) const {
-    return tiles_.render([] { return false; }, renderPixel).statistics;
-  }
-
   const RayCamera& camera_;
   BidirectionalIntegrator& integrator_;
   Film& film_;
-  const StopFlag* stop_;
-  Tiles tiles_;
-  std::vector<Rgb> fromCamera_;
+  Image fromCamera_;
   LightImage fromLights_;
   std::vector<std::vector<Splat>> splats_;  // by tile
 };
@@ -255,10 +279,17 @@ RenderResult render(const RayCamera& camera, const AddSample& addSample, const F
   return renderWaves(WaveRenderer(camera, addSample, film, options), film, options, afterWave, before);
 }
 
-RenderResult render(const RayCamera& camera, BidirectionalIntegrator& integrator, Film& film,
+RenderResult render(const RayCamera& camera, const AddImageSample& addSample, const Film& film,
                     const RenderOptions& options, const AfterWave& afterWave, const RenderResult& before) {
   options.validate();
-  return renderWaves(BidirectionalRenderer(camera, integrator, film, options), film, options, afterWave, before);
+  return renderWaves(ImageRenderer(camera, addSample, film, options), film, options, afterWave, before);
+}
+
+RenderResult render(const RayCamera& camera, BidirectionalIntegrator& integrator, Film& film,
+                    const RenderOptions& options, const AfterWave& afterWave, const RenderResult& before) {
+  BidirectionalSamples samples(camera, integrator, film);
+  const AddImageSample addSample = [&](const ImageSample& sample) { return samples.add(sample); };
+  return render(camera, addSample, film, options, afterWave, before);
 }
 
 }  // namespace lobe

@@ -44,6 +44,24 @@ struct RenderResult {
 /// Adds one sample to the pixel (x, y) of a film. Called concurrently for different pixels.
 using AddSample = std::function<void(int x, int y, Sampler& rng, PathStatistics& statistics)>;
 
+/// One sample of every pixel, of an image whose samples are made together.
+class ImageSample {
+ public:
+  virtual ~ImageSample() = default;
+  /// Its index, RenderOptions::firstSample included.
+  virtual int index() const = 0;
+  /// The number of tiles; the pixels of each are visited by one thread, in the same order on any number of threads.
+  virtual int tiles() const = 0;
+  /// Random numbers for the pixel's camera path, and independent ones for a light path.
+  using VisitPixel =
+      std::function<void(int x, int y, int tile, Sampler& rng, Sampler& lightRng, PathStatistics& statistics)>;
+  /// Calls `visit` for all pixels, in parallel by tiles.
+  virtual PathStatistics forEachPixel(const VisitPixel& visit) const = 0;
+};
+
+/// Adds one sample to every pixel of a film.
+using AddImageSample = std::function<PathStatistics(const ImageSample& sample)>;
+
 /// Called after each wave, from the calling thread, while no thread writes to the film.
 using AfterWave = std::function<void(const RenderResult&)>;
 
@@ -57,9 +75,13 @@ RenderResult render(const RayCamera& camera, const Integrator& integrator, Film&
 /// sample to the film.
 RenderResult render(const RayCamera& camera, const AddSample& addSample, const Film& film, const RenderOptions& options,
                     const AfterWave& afterWave = {}, const RenderResult& before = {});
-/// The same with light paths, sample by sample: sample s of pixel i is the radiance along its camera ray plus what the
-/// light paths of sample s of all pixels contribute to it. Rendering is only stopped between samples, so that all
-/// pixels have equally many; a film that is continued must be like that.
+/// The same for samples that are made for all pixels together: addSample must add exactly one sample to each pixel of
+/// the film. Rendering is only stopped between samples, so that all pixels have equally many; a film that is continued
+/// must be like that.
+RenderResult render(const RayCamera& camera, const AddImageSample& addSample, const Film& film,
+                    const RenderOptions& options, const AfterWave& afterWave = {}, const RenderResult& before = {});
+/// The same with light paths: sample s of pixel i is the radiance along its camera ray plus what the
+/// light paths of sample s of all pixels contribute to it.
 RenderResult render(const RayCamera& camera, BidirectionalIntegrator& integrator, Film& film,
                     const RenderOptions& options, const AfterWave& afterWave = {}, const RenderResult& before = {});
 
