@@ -68,7 +68,8 @@ IlluminationFile::IlluminationFile(FileContent file, const std::filesystem::path
   info_ = readInfo(root);
   records_ = inPlace<StoredIllumination>(*root.records());
   components_ = inPlace<CacheComponent>(*root.components());
-  if (!(info_.unit > 0 && std::isfinite(info_.unit))) refuseDamaged(name, "the unit of length is not positive");
+  // The look-up divides by the unit, whose inverse would overflow if it were subnormal.
+  if (!(info_.unit > 0 && std::isnormal(info_.unit))) refuseDamaged(name, "the unit of length is out of range");
   if (!(info_.undersampledFraction >= 0 && info_.undersampledFraction <= 1))
     refuseDamaged(name, "fraction of undersampled records out of range");
   checkComponents(components_, name);

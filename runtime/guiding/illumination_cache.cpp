@@ -16,8 +16,11 @@ constexpr float kMinNormalCosine = 0.97f;  // about 14°
 constexpr float kCellsPerUnit = 0.5f;
 constexpr float kRounding = 1e-3f;  // in cells: rounding may place a point into the cell next to its own
 
-Eigen::Vector3i cellOf(const Vec3& x, float inverseCellSize) {
-  return (x * inverseCellSize).array().floor().cast<int>();
+/// The cell of a point given in cells. Points that are too far away for integers are placed into the outermost cells;
+/// records and look-ups there lose nothing, because single precision does not resolve a cell at such a distance.
+Eigen::Vector3i cellOf(const Vec3& x) {
+  constexpr float kOutermost = 1 << 30;
+  return x.array().floor().max(-kOutermost).min(kOutermost).cast<int>();
 }
 
 /// Every cell holds records of one side only: the face of the direction cube that their normal points at.
@@ -93,8 +96,7 @@ template <class Visit>
 void IlluminationCache::forEachKey(const Place& r, const Visit& visit) const {
   const Vec3 centre = r.position * inverseCellSize_;  // in cells
   const float radius = r.radius * inverseCellSize_ + kRounding;
-  const Eigen::Vector3i low = (centre.array() - radius).floor().cast<int>();
-  const Eigen::Vector3i high = (centre.array() + radius).floor().cast<int>();
+  const Eigen::Vector3i low = cellOf(centre.array() - radius), high = cellOf(centre.array() + radius);
   for (int z = low.z(); z <= high.z(); ++z)
     for (int y = low.y(); y <= high.y(); ++y)
       for (int x = low.x(); x <= high.x(); ++x) {
@@ -189,7 +191,7 @@ const IlluminationCache::Cell* IlluminationCache::findCell(std::uint64_t key) co
 }
 
 const PackedRecord* IlluminationCache::find(const Vec3& x, const Vec3& n) const {
-  const Cell* cell = findCell(cellKey(cellOf(x, inverseCellSize_), sideOf(n)));
+  const Cell* cell = findCell(cellKey(cellOf(x * inverseCellSize_), sideOf(n)));
   if (!cell) return nullptr;
   const Entry* best = nullptr;
   float bestCost = std::numeric_limits<float>::infinity();

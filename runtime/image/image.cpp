@@ -56,12 +56,17 @@ void checkSize(const std::filesystem::path& path, std::int64_t width, std::int64
     fail(path, fmt::format("its size of {}x{} pixels is outside the supported range", width, height));
 }
 
-/// Refuses small files that claim large images: even uniform images compress to no more than kMostPerByte pixels per
+// The most pixels that a byte can stand for. In EXR files, DWA compression keeps 2 bytes for 64 pixels of a channel,
+// and zlib then shortens them by a factor of up to 1032.
+constexpr std::uintmax_t kMostPerByte = 2000, kMostPerExrByte = 40000;
+
+/// Refuses small files that claim large images: even uniform images compress to no more than mostPerByte pixels per
 /// byte.
-void checkExpansion(const std::filesystem::path& path, std::int64_t width, std::int64_t height, std::size_t bytes) {
-  constexpr std::int64_t kLarge = std::int64_t{1} << 24, kMostPerByte = 2000;
+void checkExpansion(const std::filesystem::path& path, std::int64_t width, std::int64_t height, std::uintmax_t bytes,
+                    std::uintmax_t mostPerByte) {
+  constexpr std::int64_t kLarge = std::int64_t{1} << 24;
   checkSize(path, width, height);
-  if (width * height > kLarge && width * height / kMostPerByte > static_cast<std::int64_t>(bytes))
+  if (width * height > kLarge && static_cast<std::uintmax_t>(width * height) / mostPerByte > bytes)
     fail(path, fmt::format("a file of {2} bytes cannot contain {0}x{1} pixels", width, height, bytes));
 }
 
@@ -147,7 +152,7 @@ Image readDataWindow(const std::filesystem::path& path, Imf::InputFile& file, co
 Image readExrPixels(const std::filesystem::path& path, Part part) {
   Imf::InputFile file(path.c_str());
   const Area data(file.header().dataWindow()), display(file.header().displayWindow());
-  checkSize(path, data.width, data.height);
+  checkExpansion(path, data.width, data.height, std::filesystem::file_size(path), kMostPerExrByte);
   checkSize(path, display.width, display.height);
   Image image = readDataWindow(path, file, data, part);
   return data == display ? image : placeOnDisplay(image, data, display);
@@ -238,7 +243,7 @@ Image loadPixels(const std::filesystem::path& path, std::string_view bytes, cons
 Image readHdr(const std::filesystem::path& path, std::string_view bytes, Part part) {
   if (part == Part::alpha) failWithoutAlpha(path);
   const auto [width, height] = nameErrors(path, [&] { return sizeOfRgbe(bytes); });
-  checkExpansion(path, width, height, bytes.size());
+  checkExpansion(path, width, height, bytes.size(), kMostPerByte);
   return nameErrors(path, [&] { return readRgbe(bytes); });
 }
 
@@ -277,7 +282,7 @@ Encoding resolved(const Encoding& encoding, std::string_view bytes) {
 Image readJpegImage(const std::filesystem::path& path, std::string_view bytes, const Encoding& encoding, Part part) {
   if (part == Part::alpha) failWithoutAlpha(path);
   const JpegSize size = nameErrors(path, [&] { return sizeOfJpeg(bytes); });
-  checkExpansion(path, size.width, size.height, bytes.size());
+  checkExpansion(path, size.width, size.height, bytes.size(), kMostPerByte);
   const JpegPixels pixels = nameErrors(path, [&] { return readJpeg(bytes); });
   return decodeColours(pixels.codes.data(), pixels.width, pixels.height, encoding);
 }
@@ -294,7 +299,7 @@ Image readOther(const std::filesystem::path& path, const Encoding& encoding, Par
   if (!stbi_info_from_memory(data, length, &width, &height, &channels))
     fail(path, fmt::format("unsupported image format ({}); supported are PNG, JPEG, BMP, TGA, HDR and EXR",
                            stbi_failure_reason()));
-  checkExpansion(path, width, height, bytes.size());
+  checkExpansion(path, width, height, bytes.size(), kMostPerByte);
   if (part == Part::alpha && channels != 2 && channels != 4) failWithoutAlpha(path);
   if (stbi_is_16_bit_from_memory(data, length))
     return loadPixels<stbi_us>(path, bytes, resolved(encoding, bytes), part, stbi_load_16_from_callbacks);

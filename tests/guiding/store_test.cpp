@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <limits>
+
 #include <catch2/catch.hpp>
 
 #include "runtime/core/atomic_file.h"
@@ -85,4 +87,19 @@ TEST_CASE("guiding: a cache without records can be stored") {
   const IlluminationCache read = writtenAndRead(IlluminationCache());
   CHECK(read.size() == 0);
   CHECK(read.find(Vec3::Zero(), Vec3::UnitZ()) == nullptr);
+}
+
+TEST_CASE("guiding: records and look-ups beyond the range of cell numbers are harmless") {
+  // Undefined conversions to integers are found by the preset sanitize.
+  Rng rng(4, 0, 0);
+  std::vector<IlluminationRecord> records{randomRecord(rng), randomRecord(rng), randomRecord(rng)};
+  const float far[] = {1e12f, -3e38f};
+  for (int i = 0; i < 2; ++i) records[1 + i].position = Vec3(far[i], -far[i], 0);
+  const IlluminationCache usual(records, 0.5f);
+  CHECK(usual.find(records[0].position, records[0].normal));
+  for (const float x : far) CHECK_FALSE(usual.find(Vec3(x, x, x), Vec3::UnitZ()));
+  constexpr float kSmallest = std::numeric_limits<float>::min();
+  for (IlluminationRecord& r : records) r.radius = kSmallest;
+  const IlluminationCache smallest = writtenAndRead(IlluminationCache(records, kSmallest));
+  for (const IlluminationRecord& r : records) CHECK_NOTHROW(smallest.find(r.position, r.normal));
 }

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <bit>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -260,6 +261,18 @@ TEST_CASE("materials: truncated images of all formats are rejected") {
       REQUIRE_THAT(faultOf([&] { readImage(folder.write(std::string("cut-") + file, cut)); }), Contains("cut-"));
     }
   }
+}
+
+TEST_CASE("materials: a small EXR file that claims a large image is rejected before memory is allocated") {
+  const Folder folder;
+  const fs::path exr = folder / "small.exr";
+  writeExr(exr, {"Y"}, Imf::HALF, box(0, 0, 9, 9), box(0, 0, 9, 9));
+  std::string bytes = bytesOf(exr);
+  const std::size_t window = bytes.find("dataWindow") + std::strlen("dataWindow.box2i.size");
+  const std::int32_t right = 9999999;
+  std::memcpy(&bytes[window + 2 * sizeof(right)], &right, sizeof(right));
+  REQUIRE_THAT(faultOf([&] { readImage(folder.write("claim.exr", bytes)); }),
+               Contains("claim.exr: a file of") && Contains("cannot contain 10000000x10 pixels"));
 }
 
 TEST_CASE("materials: flipped bits in an EXR file never crash") {

@@ -162,6 +162,7 @@ TEST_CASE("schema: invalid values in illumination files are rejected") {
       {"not positive definite", [](Content& c) { c.components[1].covXX = -0.01f; }},
       {"unit of length", [](Content& c) { c.info.unit = 0; }},
       {"unit of length", [&](Content& c) { c.info.unit = infinity; }},
+      {"unit of length", [](Content& c) { c.info.unit = c.records[0].radius = c.records[1].radius = 1e-40f; }},
       {"undersampled", [](Content& c) { c.info.undersampledFraction = -1; }},
   };
   for (const Fault& fault : faults) {
