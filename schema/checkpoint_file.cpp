@@ -1,5 +1,6 @@
 #include "schema/checkpoint_file.h"
 
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -14,6 +15,8 @@ namespace {
 
 static_assert(sizeof(StoredPixel) == sizeof(fb::Pixel) && alignof(StoredPixel) == alignof(fb::Pixel));
 static_assert(sizeof(StoredPass) == sizeof(fb::TrainingPass) && alignof(StoredPass) == alignof(fb::TrainingPass));
+static_assert(sizeof(StoredPilot) == sizeof(fb::Pilot) && alignof(StoredPilot) == alignof(fb::Pilot));
+static_assert(sizeof(StoredLightPathTrial) == sizeof(fb::LightPathTrial));
 static_assert(std::is_trivially_copyable_v<StoredPixel> && std::is_standard_layout_v<StoredPixel>);
 
 bool isNumber(double value) {
@@ -26,6 +29,16 @@ void checkPixel(const StoredPixel& pixel, std::size_t index, const std::string& 
       if (!isNumber(value)) refuseDamaged(name, fmt::format("pixel {}: a sum is negative or not finite", index));
   if (std::uint64_t{pixel.count} + pixel.dropped > std::numeric_limits<int>::max())
     refuseDamaged(name, fmt::format("pixel {}: number of samples out of range", index));
+}
+
+void checkChoices(const CheckpointInfo& info, const std::string& name) {
+  constexpr double kMostPathsPerPixel = 1e6;  // far more than the trial chooses
+  const auto& pilot = info.pilot;
+  const auto& trial = info.lightPathTrial;
+  if ((pilot && !isNumber(pilot->seconds)) || (trial && !isNumber(trial->seconds)))
+    refuseDamaged(name, "the time of a choice is negative or not finite");
+  if (trial && !(trial->pathsPerPixel > 0 && trial->pathsPerPixel <= kMostPathsPerPixel))
+    refuseDamaged(name, "number of light paths out of range");
 }
 
 CheckpointInfo readInfo(const fb::Checkpoint& file) {
@@ -41,6 +54,8 @@ CheckpointInfo readInfo(const fb::Checkpoint& file) {
   info.undersampledFraction = file.undersampled_fraction();
   info.learntFractions = file.learnt_fractions();
   info.counters.assign(file.counters()->begin(), file.counters()->end());
+  if (file.pilot()) info.pilot = std::bit_cast<StoredPilot>(*file.pilot());
+  if (file.light_path_trial()) info.lightPathTrial = std::bit_cast<StoredLightPathTrial>(*file.light_path_trial());
   return info;
 }
 
@@ -59,6 +74,7 @@ CheckpointFile::CheckpointFile(FileContent file, const std::filesystem::path& pa
   for (std::size_t i = 0; i < pixels_.size(); ++i) checkPixel(pixels_[i], i, name);
   if (!isNumber(info_.trainingSeconds) || !isNumber(info_.renderingSeconds))
     refuseDamaged(name, "a time is negative or not finite");
+  checkChoices(info_, name);
   if (!(info_.undersampledFraction >= 0 && info_.undersampledFraction <= 1))
     refuseDamaged(name, "fraction of undersampled records out of range");
 }
@@ -91,9 +107,13 @@ std::vector<std::byte> encodeCheckpoint(const CheckpointInfo& info, std::span<co
   const auto passVector =
       builder.CreateVectorOfStructs(reinterpret_cast<const fb::TrainingPass*>(info.passes.data()), info.passes.size());
   const auto counterVector = builder.CreateVector(info.counters);
+  const auto pilot = info.pilot ? std::optional(std::bit_cast<fb::Pilot>(*info.pilot)) : std::nullopt;
+  const auto trial =
+      info.lightPathTrial ? std::optional(std::bit_cast<fb::LightPathTrial>(*info.lightPathTrial)) : std::nullopt;
   builder.Finish(fb::CreateCheckpoint(builder, settingVector, info.width, info.height, pixelVector, illuminationVector,
                                       importanceVector, info.trainingSeconds, info.renderingSeconds, passVector,
-                                      info.undersampledFraction, info.learntFractions, counterVector));
+                                      info.undersampledFraction, info.learntFractions, counterVector,
+                                      pilot ? &*pilot : nullptr, trial ? &*trial : nullptr));
   return wrapPayload(kCheckpointFormat, std::as_bytes(std::span(builder.GetBufferPointer(), builder.GetSize())));
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -13,7 +14,7 @@
 
 namespace lobe {
 
-inline constexpr FileFormat kCheckpointFormat{{'C', 'K', 'P', 'T'}, 2, 0};
+inline constexpr FileFormat kCheckpointFormat{{'C', 'K', 'P', 'T'}, 3, 0};
 
 // Read in place: the layout of these structs equals that of the schema (size checked at compile time, order of the
 // fields by a test).
@@ -26,6 +27,12 @@ struct StoredPass {
   std::uint64_t particles, records;
   double logLikelihood;  ///< NaN if not known
 };
+struct StoredPilot {
+  double pathVariance, pathCost, productVariance, productCost, seconds;
+};
+struct StoredLightPathTrial {
+  double variance, cost, pathsPerPixel, secondMoment, left, costWithLight, seconds;
+};
 
 /// Everything but the film, the illumination and the importance.
 struct CheckpointInfo {
@@ -36,6 +43,8 @@ struct CheckpointInfo {
   double undersampledFraction = 0;
   bool learntFractions = false;
   std::vector<std::uint64_t> counters;
+  std::optional<StoredPilot> pilot;
+  std::optional<StoredLightPathTrial> lightPathTrial;
 };
 
 /// The largest film that a file can hold.
@@ -45,7 +54,8 @@ inline constexpr std::uint64_t kMaxCheckpointPixels = std::uint64_t{1} << 25;
 class CheckpointFile {
  public:
   /// Reads the file and checks its structure and content: one pixel for each place of the film, sums that are finite
-  /// and not negative, sample counts that fit an int. Illumination and importance are not checked. Throws
+  /// and not negative, sample counts that fit an int, times and a number of light
+  /// paths that are finite and not negative. Illumination and importance are not checked. Throws
   /// std::runtime_error that names the file and the fault.
   static CheckpointFile open(const std::filesystem::path& path);
 

@@ -20,6 +20,17 @@ Film::Pixel loaded(const StoredPixel& p) {
   return {{p.sum[0], p.sum[1], p.sum[2]}, {p.squares[0], p.squares[1], p.squares[2]}, p.count, p.dropped};
 }
 
+std::optional<StoredPilot> storedPilot(const std::optional<Pilot>& p) {
+  if (!p) return std::nullopt;
+  return StoredPilot{p->path.variance, p->path.cost, p->product.variance, p->product.cost, p->seconds};
+}
+
+std::optional<StoredLightPathTrial> storedTrial(const std::optional<LightPathTrial>& t, double seconds) {
+  if (!t) return std::nullopt;
+  return StoredLightPathTrial{t->variance, t->cost,          t->pathsPerPixel, t->secondMoment,
+                              t->left,     t->costWithLight, seconds};
+}
+
 /// All counters of the statistics, in a fixed order.
 template <class Statistics>
 auto countersOf(Statistics& statistics) {
@@ -47,8 +58,9 @@ void checkSameRun(const CheckpointFile& file, const std::filesystem::path& path,
 }
 
 std::vector<std::byte> encodeCheckpoint(const RunSettings& settings, const Film& film, const RenderResult& result,
-                                        const TrainingReport& training, std::span<const std::byte> illumination,
+                                        const Guiding& guiding, std::span<const std::byte> illumination,
                                         std::span<const std::byte> importance) {
+  const TrainingReport& training = guiding.training.report;
   CheckpointInfo info;
   info.settings = settings;
   info.width = static_cast<std::uint32_t>(film.width());
@@ -60,6 +72,8 @@ std::vector<std::byte> encodeCheckpoint(const RunSettings& settings, const Film&
                            pass.logLikelihood.value_or(std::numeric_limits<double>::quiet_NaN())});
   info.undersampledFraction = training.undersampledFraction;
   info.learntFractions = training.learntFractions;
+  info.pilot = storedPilot(guiding.pilot);
+  info.lightPathTrial = storedTrial(guiding.lightPaths, guiding.secondsLightPaths);
   for (const std::uint64_t* count : countersOf(result.statistics)) info.counters.push_back(*count);
   std::vector<StoredPixel> pixels(film.pixels().size());
   std::ranges::transform(film.pixels(), pixels.begin(), stored);
@@ -92,6 +106,15 @@ TrainingReport trainingOf(const CheckpointFile& file) {
   report.undersampledFraction = file.info().undersampledFraction;
   report.learntFractions = file.info().learntFractions;
   return report;
+}
+
+void restoreChoices(const CheckpointFile& file, Guiding& guiding) {
+  if (const auto& p = file.info().pilot)
+    guiding.pilot = {{p->pathVariance, p->pathCost}, {p->productVariance, p->productCost}, p->seconds};
+  if (const auto& t = file.info().lightPathTrial) {
+    guiding.lightPaths = {t->variance, t->cost, t->pathsPerPixel, t->secondMoment, t->left, t->costWithLight};
+    guiding.secondsLightPaths = t->seconds;
+  }
 }
 
 }  // namespace lobe

@@ -189,6 +189,7 @@ void Run::readCheckpoint() {
     guiding_.training.importance =
         restoreIllumination(IlluminationFile::parse(resumed_->importance(), job_.resume), job_.resume, *scene_).field;
   guiding_.training.report = trainingOf(*resumed_);
+  restoreChoices(*resumed_, guiding_);
   printNote(kTool, fmt::format("{}: continues with sample {} of each pixel", job_.resume.string(), least + 1));
 }
 
@@ -307,7 +308,7 @@ void Run::writeCheckpoint(OutputErrors& errors) const {
   if (job_.checkpoint.empty()) return;
   errors.attempt(job_.checkpoint, [&] {
     const std::vector<std::byte> bytes =
-        encodeCheckpoint(settings_, film(), result_, guiding_.training.report, illumination_, importance_);
+        encodeCheckpoint(settings_, film(), result_, guiding_, illumination_, importance_);
     writeAtomically(job_.checkpoint, std::span<const std::byte>(bytes));
   });
 }

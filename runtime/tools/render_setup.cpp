@@ -60,14 +60,27 @@ std::unique_ptr<BidirectionalIntegrator> makeWithLightPaths(const RenderJob& job
   if (scene.lights.environmentProbability() > 0)
     guiding.environmentGuide.emplace(learnEnvironmentGuide(scene, camera, *guiding.sampler, paths, job.seed));
   const PhotonEmission emission(scene.lights, guiding.environmentGuide ? &*guiding.environmentGuide : nullptr);
-  guiding.lightPaths = tryLightPaths(scene, camera, options, *guiding.sampler, emission, paths, job.seed);
-  guiding.secondsLightPaths = watch.seconds();
+  if (!guiding.lightPaths) {
+    guiding.lightPaths = tryLightPaths(scene, camera, options, *guiding.sampler, emission, paths, job.seed);
+    guiding.secondsLightPaths = watch.seconds();
+  }
   const LightPathTrial& trial = *guiding.lightPaths;
   guiding.usesLightPaths =
       job.lightPaths == LightPathUse::on || trial.inefficiencyWithLight() < kGain * trial.inefficiency();
   if (!guiding.usesLightPaths) return nullptr;
   return std::make_unique<GuidedLightIntegrator>(scene, camera, options, *guiding.sampler,
                                                  LightTracing{trial.pathsPerPixel, emission});
+}
+
+Pilot runPilot(const RenderJob& job, const RayCamera& camera, const Integrator& path, const Integrator& guided) {
+  const Stopwatch watch;
+  PilotOptions pilot;
+  pilot.tiles = static_cast<int>(pilot.tiles * preparationSize(job));
+  pilot.seed = job.seed;
+  // The same picture for a seed is only promised for --spp.
+  pilot.timed = job.seconds.has_value();
+  const auto results = comparePilots(camera, std::array<const Integrator*, 2>{&path, &guided}, pilot);
+  return {results[0], results[1], watch.seconds()};
 }
 
 /// path, guided or product.
@@ -82,14 +95,7 @@ AnyIntegrator makeUnidirectional(const RenderJob& job, const RenderScene& scene,
   }
   auto guided = std::make_unique<GuidedIntegrator>(scene, options, *guiding.sampler);
   if (job.integrator == IntegratorKind::automatic) {
-    const Stopwatch watch;
-    PilotOptions pilot;
-    pilot.tiles = static_cast<int>(pilot.tiles * preparationSize(job));
-    pilot.seed = job.seed;
-    // The same picture for a seed is only promised for --spp.
-    pilot.timed = job.seconds.has_value();
-    const auto results = comparePilots(camera, std::array<const Integrator*, 2>{path.get(), guided.get()}, pilot);
-    guiding.pilot = {results[0], results[1], watch.seconds()};
+    if (!guiding.pilot) guiding.pilot = runPilot(job, camera, *path, *guided);
     if (guiding.pilot->best() == IntegratorKind::path) return path;
   }
   if (auto withLightPaths = makeWithLightPaths(job, scene, camera, options, guiding)) return withLightPaths;

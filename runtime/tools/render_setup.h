@@ -4,7 +4,10 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <string>
+#include <utility>
 #include <variant>
+#include <vector>
 
 #include "runtime/guiding/brdf_caches.h"
 #include "runtime/render/gradients/gradient_integrator.h"
@@ -15,11 +18,13 @@
 #include "runtime/render/integrators/sample_counts.h"
 #include "runtime/render/training/light_path_plan.h"
 #include "runtime/render/training/training.h"
-#include "runtime/tools/checkpoint.h"
 #include "runtime/tools/render_job.h"
 #include "schema/illumination_file.h"
 
 namespace lobe {
+
+/// Names and values of everything that determines a picture, in the order in which differences are reported.
+using RunSettings = std::vector<std::pair<std::string, std::string>>;
 
 /// The comparison of path and product for IntegratorKind::automatic.
 struct Pilot {
@@ -80,7 +85,7 @@ RunSettings settingsOf(const RenderJob& job, const Scene& scene, const Guiding& 
 
 /// The integrator of the job. Learns the counts of samples if it uses them, and sets guiding.counts; for
 /// IntegratorKind::automatic, compares path and product, and sets guiding.pilot; tries light paths, and sets
-/// guiding.lightPaths. The integrator refers to `guiding`.
+/// guiding.lightPaths; does neither again if they are set. The integrator refers to `guiding`.
 AnyIntegrator makeIntegrator(const RenderJob& job, const RenderScene& scene, const RayCamera& camera, Guiding& guiding);
 
 }  // namespace lobe

@@ -13,6 +13,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <fmt/format.h>
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
@@ -298,6 +299,19 @@ TEST_CASE("loberender: a resumed render has the bytes of an uninterrupted one") 
     CHECK(folder.run(render + " --spp 6 -o again.exr --resume run.ckpt").code == 0);
     CHECK(folder.bytes("again.exr") == folder.bytes("whole.exr"));
     CHECK_THAT(fault(folder, render + " --spp 5 -o part.exr --resume run.ckpt", 1), Contains("more than --spp 5"));
+  }
+}
+
+TEST_CASE("loberender: a resumed timed run keeps its choice of the integrator and of light paths") {
+  const SceneFolder folder(true);
+  for (const auto& [integrator, key] : {std::pair("auto", "pilot"), std::pair("product", "light_paths")}) {
+    const std::string render = fmt::format("loberender scene.xml --integrator {}{} -o a.exr", integrator, kTraining);
+    REQUIRE(folder.run(render + " --seconds 0.5 --stats part.json --checkpoint run.ckpt").code == 0);
+    REQUIRE(folder.run(render + " --seconds 1 --stats whole.json --resume run.ckpt").code == 0);
+    const auto part = nlohmann::json::parse(folder.bytes("part.json")),
+               whole = nlohmann::json::parse(folder.bytes("whole.json"));
+    CHECK(part[key].is_object());
+    CHECK(part[key] == whole[key]);  // with its time, which differs if the comparison is repeated
   }
 }
 
