@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 
-#include "runtime/image/error_metrics.h"
 #include "runtime/image/image_output.h"
 
 namespace lobe {
@@ -20,9 +19,8 @@ Rgb errorColour(float relativeError) {
   return (1.0f - t) * kRamp[below] + t * kRamp[below + 1];
 }
 
-void writeErrorMap(const std::filesystem::path& path, const Image& reference, const Image& image) {
-  const std::vector<float> errors = relativeErrors(reference, image);
-  Image map(image.width, image.height);
+void writeErrorMap(const std::filesystem::path& path, int width, std::span<const float> errors) {
+  Image map(width, static_cast<int>(errors.size()) / width);
   std::transform(errors.begin(), errors.end(), map.pixels.begin(), errorColour);
   writeImage(path, map);
 }

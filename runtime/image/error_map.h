@@ -2,6 +2,7 @@
 // False-colour images of the error of each pixel.
 
 #include <filesystem>
+#include <span>
 
 #include "runtime/image/image.h"
 
@@ -12,11 +13,11 @@ namespace lobe {
 inline constexpr float kMapLow = 1e-4f;
 inline constexpr float kMapHigh = 1.0f;
 
-/// Linear colour of a relative error as defined in error_metrics.h; magenta for NaN.
+/// Linear colour of a relative error (error_metrics.h) or variance (pair_variance.h); magenta for NaN.
 Rgb errorColour(float relativeError);
 
-/// Writes the relative error of each pixel as a PNG. Throws std::runtime_error if the sizes differ or the file cannot
-/// be written.
-void writeErrorMap(const std::filesystem::path& path, const Image& reference, const Image& image);
+/// Writes the colours of the errors of all pixels, row by row from the top, as a PNG of this width. Throws
+/// std::runtime_error if the file cannot be written.
+void writeErrorMap(const std::filesystem::path& path, int width, std::span<const float> errors);
 
 }  // namespace lobe

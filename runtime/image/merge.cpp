@@ -74,6 +74,14 @@ std::vector<SampleRange> joined(std::vector<SampleRange> ranges) {
   return result;
 }
 
+std::vector<SampleRange> rangesOf(const std::filesystem::path& path, const ImageAttributes& attributes) {
+  try {
+    return sampleRanges(attributes);
+  } catch (const std::runtime_error& e) {
+    throw std::runtime_error(fmt::format("{}: {}", path.string(), e.what()));
+  }
+}
+
 Part describe(const std::filesystem::path& path) {
   if (!std::filesystem::exists(path)) throw std::runtime_error(path.string() + ": no such file");
   Part part{path, readAttributes(path), 0, {}};
@@ -82,11 +90,7 @@ Part describe(const std::filesystem::path& path) {
     throw std::runtime_error(
         fmt::format("{}: does not say how many samples it has; merge .exr files written by loberender", path.string()));
   part.samples = static_cast<double>(*samples);
-  try {
-    part.ranges = sampleRanges(part.attributes);
-  } catch (const std::runtime_error& e) {
-    throw std::runtime_error(fmt::format("{}: {}", path.string(), e.what()));
-  }
+  part.ranges = rangesOf(path, part.attributes);
   return part;
 }
 
@@ -190,6 +194,14 @@ std::vector<SampleRange> sampleRanges(const ImageAttributes& attributes) {
   if (!integrator || !seed || !samples) return {};
   const std::uint64_t first = findCount(attributes, "sampleOffset").value_or(0);
   return {{*integrator, *seed, first, first + *samples}};
+}
+
+void checkDifferentSeeds(const std::filesystem::path& a, const std::filesystem::path& b) {
+  for (const SampleRange& r : rangesOf(a, readAttributes(a)))
+    for (const SampleRange& s : rangesOf(b, readAttributes(b)))
+      if (r.seed == s.seed)
+        throw std::runtime_error(fmt::format("{} and {}: both have samples of seed {}; render one with another --seed",
+                                             a.string(), b.string(), r.seed));
 }
 
 MergedImage mergeImages(std::span<const std::filesystem::path> paths) {

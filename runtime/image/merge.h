@@ -24,6 +24,10 @@ struct SampleRange {
 /// Throws std::runtime_error if sampleRanges does not have the format that mergeImages writes.
 std::vector<SampleRange> sampleRanges(const ImageAttributes& attributes);
 
+/// Throws std::runtime_error that names both files if they have samples of the same seed, as their attributes say. Such
+/// images are not independent. Does nothing for images without these attributes.
+void checkDifferentSeeds(const std::filesystem::path& a, const std::filesystem::path& b);
+
 struct MergedImage {
   Image image;
   ImageAttributes attributes;

@@ -1,4 +1,4 @@
-// lobecompare: measures the errors of images against a reference, or merges images.
+// lobecompare: measures the errors of images against a reference or the variance of a pair, or merges images.
 
 #include <cstdio>
 #include <filesystem>
@@ -13,6 +13,7 @@
 #include "runtime/image/error_metrics.h"
 #include "runtime/image/image_output.h"
 #include "runtime/image/merge.h"
+#include "runtime/image/pair_variance.h"
 #include "runtime/tools/json_text.h"
 #include "runtime/tools/tool.h"
 
@@ -21,7 +22,7 @@ namespace {
 struct Arguments {
   std::string reference;
   std::vector<std::string> images;
-  bool json = false;
+  bool json = false, pair = false;
   std::string map, merge;
   int shrink = 1;
 };
@@ -32,7 +33,7 @@ struct Comparison {
 };
 
 void declare(CLI::App& app, Arguments& arguments) {
-  app.add_option("REFERENCE", arguments.reference, "Reference image; with --merge, the first of the images")
+  app.add_option("REFERENCE", arguments.reference, "Reference image; with --merge or --pair, the first of the images")
       ->required()
       ->type_name("FILE");
   app.add_option("IMAGE", arguments.images, "Images of the same size as the reference")
@@ -42,19 +43,24 @@ void declare(CLI::App& app, Arguments& arguments) {
   auto* json = app.add_flag("--json", arguments.json, "Print the errors as JSON");
   auto* map = app.add_option(
       "--map", arguments.map,
-      fmt::format("Write a map of the relative error of each pixel of a single image to this PNG file, from {:g} "
-                  "(black) over blue, red and yellow to {:g} (white)",
+      fmt::format("Write a map of the relative error (with --pair: variance) of each pixel of a single image to this "
+                  "PNG file, from {:g} (black) over blue, red and yellow to {:g} (white)",
                   lobe::kMapLow, lobe::kMapHigh));
   map->type_name("OUT.png");
   auto* shrink = app.add_option("--shrink", arguments.shrink, "First average the reference over squares of N×N pixels")
                      ->check(CLI::Range(1, 1024))
                      ->type_name("N");
+  auto* pair = app.add_flag("--pair", arguments.pair,
+                            "Take two images of one method with different seeds, and print the relative variance of a "
+                            "pixel with 95 % confidence intervals; no reference is needed")
+                   ->excludes(shrink);
   app.add_option("--merge", arguments.merge,
                  "Write the mean of all images, weighted by their numbers of samples, to this EXR file, instead of "
                  "comparing them")
       ->type_name("OUT.exr")
       ->excludes(json)
       ->excludes(map)
+      ->excludes(pair)
       ->excludes(shrink);
 }
 
@@ -71,6 +77,7 @@ void checkMerge(const Arguments& arguments) {
 
 void checkArguments(const Arguments& arguments) {
   if (!arguments.merge.empty()) checkMerge(arguments);
+  if (arguments.pair && arguments.images.size() != 1) throw lobe::UsageError("--pair takes two images");
   for (const std::filesystem::path output : {arguments.merge, arguments.map})
     if (!output.empty()) lobe::checkNotRead(output, all(arguments));
   if (arguments.map.empty()) return;
@@ -78,9 +85,11 @@ void checkArguments(const Arguments& arguments) {
   if (std::filesystem::path(arguments.map).extension() != ".png") throw lobe::UsageError("--map must name a .png file");
 }
 
-lobe::ErrorMetrics measure(const lobe::Image& reference, const lobe::Image& image, const std::string& name) {
+/// Adds the name of the image to the message of an error.
+template <class Measure>
+auto measured(const std::string& name, const Measure& measure) {
   try {
-    return lobe::compareImages(reference, image);
+    return measure();
   } catch (const std::runtime_error& e) {
     throw std::runtime_error(fmt::format("{}: {}", name, e.what()));
   }
@@ -88,8 +97,8 @@ lobe::ErrorMetrics measure(const lobe::Image& reference, const lobe::Image& imag
 
 Comparison compare(const lobe::Image& reference, const std::string& name, const std::string& map) {
   const lobe::Image image = lobe::readImage(name);
-  Comparison result{name, measure(reference, image, name)};
-  if (!map.empty()) lobe::writeErrorMap(map, reference, image);
+  Comparison result{name, measured(name, [&] { return lobe::compareImages(reference, image); })};
+  if (!map.empty()) lobe::writeErrorMap(map, image.width, lobe::relativeErrors(reference, image));
   return result;
 }
 
@@ -124,6 +133,46 @@ void printTable(const std::vector<Comparison>& comparisons) {
   table.print(stdout);
 }
 
+// ---- Pairs
+
+nlohmann::ordered_json intervalJson(const lobe::Interval& interval) {
+  return {interval.low, interval.high};
+}
+
+void printJson(const lobe::PairVariance& v, const Arguments& arguments) {
+  const nlohmann::ordered_json json{{"images", all(arguments)},
+                                    {"relvar", v.all.value},
+                                    {"relvar_interval", intervalJson(v.all.interval)},
+                                    {"relvar_drop_0.1pct", v.drop01.value},
+                                    {"relvar_drop_0.1pct_interval", intervalJson(v.drop01.interval)},
+                                    {"relvar_drop_1pct", v.drop1.value},
+                                    {"relvar_drop_1pct_interval", intervalJson(v.drop1.interval)},
+                                    {"mean_ratio", v.meanRatio},
+                                    {"nonfinite", v.nonfinite}};
+  fmt::print("{}\n", lobe::jsonText(json));
+}
+
+std::string textOf(const lobe::MeanEstimate& e) {
+  return fmt::format("{:.6g} [{:.4g}, {:.4g}]", e.value, e.interval.low, e.interval.high);
+}
+
+void printTable(const lobe::PairVariance& v, const Arguments& arguments) {
+  lobe::Table table({"images", "relative variance [95 %]", "without worst 0.1 %", "without worst 1 %", "ratio of means",
+                     "non-finite"});
+  table.add({arguments.reference + ", " + arguments.images[0], textOf(v.all), textOf(v.drop01), textOf(v.drop1),
+             fmt::format("{:.5f}", v.meanRatio), fmt::format("{}", v.nonfinite)});
+  table.print(stdout);
+}
+
+void comparePair(const Arguments& arguments) {
+  const std::string& name = arguments.images[0];
+  const lobe::Image a = lobe::readImage(arguments.reference), b = lobe::readImage(name);
+  lobe::checkDifferentSeeds(arguments.reference, name);
+  const lobe::PairVariance variance = measured(name, [&] { return lobe::comparePair(a, b); });
+  if (!arguments.map.empty()) lobe::writeErrorMap(arguments.map, a.width, lobe::relativeVariances(a, b));
+  arguments.json ? printJson(variance, arguments) : printTable(variance, arguments);
+}
+
 lobe::Image readReference(const Arguments& arguments) {
   const lobe::Image reference = lobe::readImage(arguments.reference);
   try {
@@ -141,6 +190,7 @@ void merge(const Arguments& arguments) {
 void run(const Arguments& arguments) {
   checkArguments(arguments);
   if (!arguments.merge.empty()) return merge(arguments);
+  if (arguments.pair) return comparePair(arguments);
   const lobe::Image reference = readReference(arguments);
   std::vector<Comparison> comparisons;
   for (const std::string& name : arguments.images) comparisons.push_back(compare(reference, name, arguments.map));
@@ -155,6 +205,7 @@ void run(const Arguments& arguments) {
 int main(int argc, char** argv) {
   Arguments arguments;
   return lobe::runTool(
-      "lobecompare", "Measures the errors of images against a reference, or merges images.", argc, argv,
-      [&](CLI::App& app) { declare(app, arguments); }, [&] { run(arguments); });
+      "lobecompare",
+      "Measures the errors of images against a reference or the variance of a pair of images, or merges images.", argc,
+      argv, [&](CLI::App& app) { declare(app, arguments); }, [&] { run(arguments); });
 }

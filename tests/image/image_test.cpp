@@ -182,6 +182,7 @@ TEST_CASE("render: error colours increase monotonically with the error") {
     previous = errorColour(e).x();
   }
   const Folder folder;
-  writeErrorMap(folder / "map.png", Image(4, 3, grey(1)), Image(4, 3, grey(2)));
-  CHECK(readImage(folder / "map.png").width == 4);
+  writeErrorMap(folder / "map.png", 4, relativeErrors(Image(4, 3, grey(1)), Image(4, 3, grey(2))));
+  const Image map = readImage(folder / "map.png");
+  CHECK((map.width == 4 && map.height == 3));
 }
