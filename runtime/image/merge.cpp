@@ -204,6 +204,10 @@ void checkDifferentSeeds(const std::filesystem::path& a, const std::filesystem::
                                              a.string(), b.string(), r.seed));
 }
 
+double samplesOf(const std::filesystem::path& path) {
+  return describe(path).samples;
+}
+
 MergedImage mergeImages(std::span<const std::filesystem::path> paths) {
   std::vector<Part> parts;
   for (const auto& path : paths) {
@@ -214,6 +218,25 @@ MergedImage mergeImages(std::span<const std::filesystem::path> paths) {
   std::vector<double> sums;
   Image image = weightedMean(parts, sums);
   return {std::move(image), mergedAttributes(parts, sums)};
+}
+
+Image varianceOfMerged(std::span<const std::filesystem::path> paths, const Image& merged) {
+  if (paths.size() < 2) throw std::runtime_error("the variance of a merged image needs at least two parts");
+  // Part i has the variance σ²/samples, so that Σ samples (x − mean)² / (parts − 1) is an estimate of σ².
+  std::vector<Eigen::Array3d> sum(merged.pixels.size(), Eigen::Array3d::Zero());
+  double samples = 0;
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) checkDifferentSeeds(paths[j], paths[i]);
+    const double ofPart = samplesOf(paths[i]);
+    const Image image = readImage(paths[i]);
+    for (std::size_t p = 0; p < sum.size(); ++p)
+      sum[p] += ofPart * (image.pixels[p] - merged.pixels[p]).cast<double>().square();
+    samples += ofPart;
+  }
+  Image variance(merged.width, merged.height);
+  const double factor = 1 / (samples * (static_cast<double>(paths.size()) - 1));
+  for (std::size_t p = 0; p < sum.size(); ++p) variance.pixels[p] = (factor * sum[p]).cast<float>();
+  return variance;
 }
 
 }  // namespace lobe

@@ -28,6 +28,9 @@ std::vector<SampleRange> sampleRanges(const ImageAttributes& attributes);
 /// images are not independent. Does nothing for images without these attributes.
 void checkDifferentSeeds(const std::filesystem::path& a, const std::filesystem::path& b);
 
+/// The samples per pixel of an image. Throws std::runtime_error that names the file if it does not record them.
+double samplesOf(const std::filesystem::path& path);
+
 struct MergedImage {
   Image image;
   ImageAttributes attributes;
@@ -40,5 +43,10 @@ struct MergedImage {
 /// Throws std::runtime_error that names the file or files if an image does not record its number of samples, sizes or
 /// scenes differ, or two images contain samples of the same range.
 MergedImage mergeImages(std::span<const std::filesystem::path> paths);
+
+/// The variance of each pixel and channel of the merged image, from the differences between its parts, which must have
+/// different seeds. Throws std::runtime_error like mergeImages, and if there are fewer than two parts or two parts have
+/// the same seed.
+Image varianceOfMerged(std::span<const std::filesystem::path> paths, const Image& merged);
 
 }  // namespace lobe

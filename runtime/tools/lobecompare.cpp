@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "runtime/image/agreement.h"
 #include "runtime/image/error_map.h"
 #include "runtime/image/error_metrics.h"
 #include "runtime/image/image_output.h"
@@ -21,9 +22,9 @@ namespace {
 
 struct Arguments {
   std::string reference;
-  std::vector<std::string> images;
+  std::vector<std::string> images, others;
   bool json = false, pair = false;
-  std::string map, merge;
+  std::string map, merge, variance;
   int shrink = 1;
 };
 
@@ -54,14 +55,28 @@ void declare(CLI::App& app, Arguments& arguments) {
                             "Take two images of one method with different seeds, and print the relative variance of a "
                             "pixel with 95 % confidence intervals; no reference is needed")
                    ->excludes(shrink);
-  app.add_option("--merge", arguments.merge,
-                 "Write the mean of all images, weighted by their numbers of samples, to this EXR file, instead of "
-                 "comparing them")
+  auto* agreement = app.add_option("--agree-with", arguments.others,
+                                   "Test whether the images of one method, at least two with different seeds, and "
+                                   "these images of another method can have the same expected value")
+                        ->type_name("FILE")
+                        ->excludes(map)
+                        ->excludes(pair)
+                        ->excludes(shrink)
+                        ->default_str("");
+  auto* merge =
+      app.add_option("--merge", arguments.merge,
+                     "Write the mean of all images, weighted by their numbers of samples, to this EXR file, instead of "
+                     "comparing them")
+          ->type_name("OUT.exr")
+          ->excludes(agreement)
+          ->excludes(json)
+          ->excludes(map)
+          ->excludes(pair)
+          ->excludes(shrink);
+  app.add_option("--variance", arguments.variance,
+                 "With --merge of images with different seeds: write the variance of the merged image to this EXR file")
       ->type_name("OUT.exr")
-      ->excludes(json)
-      ->excludes(map)
-      ->excludes(pair)
-      ->excludes(shrink);
+      ->needs(merge);
 }
 
 std::vector<std::filesystem::path> all(const Arguments& arguments) {
@@ -73,12 +88,16 @@ std::vector<std::filesystem::path> all(const Arguments& arguments) {
 void checkMerge(const Arguments& arguments) {
   if (std::filesystem::path(arguments.merge).extension() != ".exr")
     throw lobe::UsageError("--merge must name an .exr file, because it stores the number of samples");
+  if (arguments.variance.empty()) return;
+  if (std::filesystem::path(arguments.variance).extension() != ".exr")
+    throw lobe::UsageError("--variance must name an .exr file");
+  if (arguments.variance == arguments.merge) throw lobe::UsageError("--merge and --variance must name different files");
 }
 
 void checkArguments(const Arguments& arguments) {
   if (!arguments.merge.empty()) checkMerge(arguments);
   if (arguments.pair && arguments.images.size() != 1) throw lobe::UsageError("--pair takes two images");
-  for (const std::filesystem::path output : {arguments.merge, arguments.map})
+  for (const std::filesystem::path output : {arguments.merge, arguments.variance, arguments.map})
     if (!output.empty()) lobe::checkNotRead(output, all(arguments));
   if (arguments.map.empty()) return;
   if (arguments.images.size() > 1) throw lobe::UsageError("--map takes one image, but several are given");
@@ -173,6 +192,41 @@ void comparePair(const Arguments& arguments) {
   arguments.json ? printJson(variance, arguments) : printTable(variance, arguments);
 }
 
+// ---- Agreement of two methods
+
+std::vector<lobe::WeightedPicture> readPictures(const std::vector<std::filesystem::path>& paths) {
+  std::vector<lobe::WeightedPicture> pictures;
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) lobe::checkDifferentSeeds(paths[j], paths[i]);
+    pictures.push_back({lobe::readImage(paths[i]), lobe::samplesOf(paths[i])});
+  }
+  return pictures;
+}
+
+void printAgreement(const lobe::Agreement& a) {
+  fmt::print(
+      "{}: ratio of means {:.5f} ± {:.2g}, z {:.2f}; worst z {:.2f} of {} blocks of {}x{} pixels, at {},{}; "
+      "limit {:.2f}\n",
+      a.agree ? "agree" : "disagree", a.meanRatio, a.meanRatioError, a.z, a.worstZ, a.blocks, lobe::kAgreementBlock,
+      lobe::kAgreementBlock, a.worstX, a.worstY, a.limitZ);
+}
+
+void testAgreement(const Arguments& arguments) {
+  const std::vector<lobe::WeightedPicture> pictures = readPictures(all(arguments)),
+                                           others = readPictures({arguments.others.begin(), arguments.others.end()});
+  const lobe::Agreement a = measured(arguments.others[0], [&] { return lobe::testAgreement(pictures, others); });
+  if (!arguments.json) return printAgreement(a);
+  const nlohmann::ordered_json json{{"agree", a.agree},
+                                    {"mean_ratio", a.meanRatio},
+                                    {"mean_ratio_error", a.meanRatioError},
+                                    {"z", a.z},
+                                    {"worst_z", a.worstZ},
+                                    {"limit_z", a.limitZ},
+                                    {"blocks", a.blocks},
+                                    {"worst_at", {a.worstX, a.worstY}}};
+  fmt::print("{}\n", lobe::jsonText(json));
+}
+
 lobe::Image readReference(const Arguments& arguments) {
   const lobe::Image reference = lobe::readImage(arguments.reference);
   try {
@@ -184,6 +238,8 @@ lobe::Image readReference(const Arguments& arguments) {
 
 void merge(const Arguments& arguments) {
   const lobe::MergedImage merged = lobe::mergeImages(all(arguments));
+  if (!arguments.variance.empty())
+    lobe::writeImage(arguments.variance, lobe::varianceOfMerged(all(arguments), merged.image));
   lobe::writeImage(arguments.merge, merged.image, merged.attributes);
 }
 
@@ -191,6 +247,7 @@ void run(const Arguments& arguments) {
   checkArguments(arguments);
   if (!arguments.merge.empty()) return merge(arguments);
   if (arguments.pair) return comparePair(arguments);
+  if (!arguments.others.empty()) return testAgreement(arguments);
   const lobe::Image reference = readReference(arguments);
   std::vector<Comparison> comparisons;
   for (const std::string& name : arguments.images) comparisons.push_back(compare(reference, name, arguments.map));
