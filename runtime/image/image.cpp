@@ -88,7 +88,7 @@ float decode(float encoded, const Encoding& encoding) {
 /// The part of a file that is read: its colours, or its alpha channel as grey.
 enum class Part { colours, alpha };
 
-using ChannelNames = std::array<const char*, 3>;
+using ChannelNames = std::array<std::string, 3>;
 
 [[noreturn]] void failWithoutAlpha(const std::filesystem::path& path) {
   fail(path, "it has no alpha channel");
@@ -128,8 +128,8 @@ Image placeOnDisplay(const Image& data, const Area& dataWindow, const Area& disp
 }
 
 /// Reads the requested channels of the data window.
-Image readDataWindow(const std::filesystem::path& path, Imf::InputFile& file, const Area& area, Part part) {
-  const ChannelNames names = exrChannels(path, file.header().channels(), part);
+Image readDataWindow(const std::filesystem::path& path, Imf::InputFile& file, const Area& area,
+                     const ChannelNames& names) {
   const int distinct = names[0] == names[1] ? 1 : 3;
   Image image(static_cast<int>(area.width), static_cast<int>(area.height));
   // OpenEXR addresses pixels by their coordinates in the data window, hence the shifted origin.
@@ -149,18 +149,23 @@ Image readDataWindow(const std::filesystem::path& path, Imf::InputFile& file, co
   return image;
 }
 
-Image readExrPixels(const std::filesystem::path& path, Part part) {
+/// namesOf: given the list of channels, which to read; nullopt: none, and there is no image.
+template <class NamesOf>
+std::optional<Image> readExrPixels(const std::filesystem::path& path, const NamesOf& namesOf) {
   Imf::InputFile file(path.c_str());
+  const std::optional<ChannelNames> names = namesOf(file.header().channels());
+  if (!names) return std::nullopt;
   const Area data(file.header().dataWindow()), display(file.header().displayWindow());
   checkExpansion(path, data.width, data.height, std::filesystem::file_size(path), kMostPerExrByte);
   checkSize(path, display.width, display.height);
-  Image image = readDataWindow(path, file, data, part);
+  Image image = readDataWindow(path, file, data, *names);
   return data == display ? image : placeOnDisplay(image, data, display);
 }
 
-Image readExr(const std::filesystem::path& path, Part part) {
+template <class NamesOf>
+std::optional<Image> readExr(const std::filesystem::path& path, const NamesOf& namesOf) {
   try {
-    return readExrPixels(path, part);
+    return readExrPixels(path, namesOf);
   } catch (const std::bad_alloc&) {
     fail(path, "not enough memory to read the image");
   } catch (const Iex::BaseExc& e) {
@@ -315,7 +320,9 @@ bool startsLikeExr(const std::filesystem::path& path) {
 Image readPart(const std::filesystem::path& path, const Encoding& encoding, Part part) {
   if (!std::filesystem::exists(path)) fail(path, "no such file");
   if (!std::filesystem::is_regular_file(path)) fail(path, "not a file");
-  return startsLikeExr(path) ? readExr(path, part) : readOther(path, encoding, part);
+  if (!startsLikeExr(path)) return readOther(path, encoding, part);
+  return *readExr(path,
+                  [&](const Imf::ChannelList& channels) { return std::optional(exrChannels(path, channels, part)); });
 }
 
 }  // namespace
@@ -331,6 +338,15 @@ Image readImage(const std::filesystem::path& path, Encoding encoding) {
 
 Image readAlpha(const std::filesystem::path& path) {
   return readPart(path, {}, Part::alpha);
+}
+
+std::optional<Image> readChannels(const std::filesystem::path& path, const std::array<std::string, 3>& names) {
+  if (!startsLikeExr(path)) return std::nullopt;
+  return readExr(path, [&](const Imf::ChannelList& channels) {
+    const bool complete =
+        std::ranges::all_of(names, [&](const std::string& name) { return channels.findChannel(name); });
+    return complete ? std::optional(names) : std::nullopt;
+  });
 }
 
 }  // namespace lobe

@@ -1,7 +1,10 @@
 #pragma once
 // Images in memory, and readers for image files.
 
+#include <array>
 #include <filesystem>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "runtime/core/vec.h"
@@ -41,5 +44,9 @@ Image readImage(const std::filesystem::path& path, Encoding encoding = {});
 /// The alpha channel of a file as a grey image: linear, scaled to [0, 1] for integer formats. Throws std::runtime_error
 /// like readImage, and if there is no alpha channel.
 Image readAlpha(const std::filesystem::path& path);
+
+/// Three channels of an .exr file, or one given three times. nullopt: the file lacks one of them, or is not an .exr
+/// file. Throws std::runtime_error like readImage.
+std::optional<Image> readChannels(const std::filesystem::path& path, const std::array<std::string, 3>& names);
 
 }  // namespace lobe

@@ -1,8 +1,9 @@
 #include "runtime/image/image_output.h"
 
+#include <array>
 #include <cmath>
 #include <cstring>
-#include <span>
+#include <list>
 #include <stdexcept>
 
 #include <ImfChannelList.h>
@@ -15,6 +16,7 @@
 #include <ImfStringAttribute.h>
 #include <ImfTestFile.h>
 #include <fmt/format.h>
+#include <half.h>
 
 #include "runtime/core/atomic_file.h"
 #include "runtime/core/colour.h"
@@ -41,18 +43,66 @@ std::vector<std::uint8_t> encodePixels(const Image& image) {
   return bytes;
 }
 
-Imf::Header makeHeader(const Image& image, const ImageAttributes& attributes) {
+Imf::Compression codeOf(ExrFormat::Compression compression) {
+  constexpr std::array codes{Imf::NO_COMPRESSION,  Imf::RLE_COMPRESSION,  Imf::ZIPS_COMPRESSION, Imf::ZIP_COMPRESSION,
+                             Imf::PIZ_COMPRESSION, Imf::DWAA_COMPRESSION, Imf::DWAB_COMPRESSION};
+  return codes[static_cast<std::size_t>(compression)];
+}
+
+Imf::Header makeHeader(const Image& image, const ImageAttributes& attributes, const ExrFormat& format) {
   Imf::Header header(image.width, image.height);
-  header.compression() = Imf::ZIP_COMPRESSION;
+  header.compression() = codeOf(format.compression);
   for (const auto& [name, value] : attributes) {
     if (const auto* text = std::get_if<std::string>(&value))
       header.insert(name, Imf::StringAttribute(*text));
     else
       header.insert(name, Imf::DoubleAttribute(std::get<double>(value)));
   }
-  for (const char* channel : {"R", "G", "B"}) header.channels().insert(channel, Imf::Channel(Imf::FLOAT));
   return header;
 }
+
+/// The channels of a file, and the conversion to halves.
+class Channels {
+ public:
+  Channels(Imf::Header& header, const ExrFormat& format) : header_(header), format_(format) {}
+
+  /// Adds the channels prefix + c for all components c.
+  void add(const std::string& prefix, const std::string& components, const Image& image, bool precise) {
+    const bool halves = format_.type == ExrFormat::Type::halves && !precise;
+    const char* base = halves ? toHalves(image) : reinterpret_cast<const char*>(image.pixels.data());
+    const std::size_t size = halves ? sizeof(Imath::half) : sizeof(float), stride = 3 * size;
+    const Imf::PixelType type = halves ? Imf::HALF : Imf::FLOAT;
+    for (std::size_t c = 0; c < components.size(); ++c) {
+      const std::string name = prefix + components[c];
+      header_.channels().insert(name, Imf::Channel(type));
+      frame_.insert(name, Imf::Slice(type, const_cast<char*>(base) + c * size, stride, stride * image.width));
+    }
+  }
+
+  const Imf::FrameBuffer& frame() const { return frame_; }
+  std::size_t clamped() const { return clamped_; }
+
+ private:
+  const char* toHalves(const Image& image) {
+    std::vector<Imath::half>& values = halves_.emplace_back();
+    values.reserve(3 * image.pixels.size());
+    for (const Rgb& pixel : image.pixels)
+      for (const float value : pixel) values.push_back(toHalf(value));
+    return reinterpret_cast<const char*>(values.data());
+  }
+
+  Imath::half toHalf(float value) {
+    if (!std::isfinite(value) || std::abs(value) <= kLargestHalf) return value;
+    ++clamped_;
+    return std::copysign(kLargestHalf, value);
+  }
+
+  Imf::Header& header_;
+  const ExrFormat& format_;
+  Imf::FrameBuffer frame_;
+  std::list<std::vector<Imath::half>> halves_;
+  std::size_t clamped_ = 0;
+};
 
 /// Collects a file in memory.
 class MemoryStream : public Imf::OStream {
@@ -73,16 +123,17 @@ class MemoryStream : public Imf::OStream {
   std::size_t position_ = 0;
 };
 
-void encodeExr(Imf::OStream& stream, const Image& image, const ImageAttributes& attributes) {
-  Imf::FrameBuffer frame;
-  const char* base = reinterpret_cast<const char*>(image.pixels.data());
-  const std::size_t stride = sizeof(Rgb);
-  for (int c = 0; c < 3; ++c)
-    frame.insert(std::string(1, "RGB"[c]),
-                 Imf::Slice(Imf::FLOAT, const_cast<char*>(base) + c * sizeof(float), stride, stride * image.width));
-  Imf::OutputFile file(stream, makeHeader(image, attributes));
-  file.setFrameBuffer(frame);
+/// Returns the number of clamped values.
+std::size_t encodeExr(Imf::OStream& stream, const Image& image, const ImageAttributes& attributes,
+                      std::span<const ImageLayer> layers, const ExrFormat& format) {
+  Imf::Header header = makeHeader(image, attributes, format);
+  Channels channels(header, format);
+  channels.add("", "RGB", image, false);
+  for (const ImageLayer& layer : layers) channels.add(layer.name + ".", layer.components, layer.image, layer.precise);
+  Imf::OutputFile file(stream, header);
+  file.setFrameBuffer(channels.frame());
   file.writePixels(image.height);
+  return channels.clamped();
 }
 
 void appendBytes(void* context, void* data, int size) {
@@ -107,12 +158,17 @@ void writePng(const std::filesystem::path& path, int width, int height, const st
   writeAtomically(path, std::span<const std::byte>(bytes));
 }
 
-void writeImage(const std::filesystem::path& path, const Image& image, const ImageAttributes& attributes) {
+std::size_t writeImage(const std::filesystem::path& path, const Image& image, const ImageAttributes& attributes,
+                       std::span<const ImageLayer> layers, const ExrFormat& format) {
   checkImageName(path);
-  if (extensionOf(path) == ".png") return writePng(path, image.width, image.height, encodePixels(image));
+  if (extensionOf(path) == ".png") {
+    writePng(path, image.width, image.height, encodePixels(image));
+    return 0;
+  }
   MemoryStream stream;
-  nameErrors(path, [&] { encodeExr(stream, image, attributes); });
+  const std::size_t clamped = nameErrors(path, [&] { return encodeExr(stream, image, attributes, layers, format); });
   writeAtomically(path, stream.bytes());
+  return clamped;
 }
 
 ImageAttributes readAttributes(const std::filesystem::path& path) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
@@ -16,13 +17,33 @@ namespace lobe {
 /// must not contain times.
 using ImageAttributes = std::map<std::string, std::variant<std::string, double>>;
 
+/// How pixels are stored in an .exr file.
+struct ExrFormat {
+  enum class Type { floats, halves } type = Type::floats;
+  enum class Compression { none, rle, zips, zip, piz, dwaa, dwab } compression = Compression::zip;
+};
+
+/// The most and the least that the type half can store.
+inline constexpr float kLargestHalf = 65504.0f;
+
+/// Channels of an .exr file besides the colours: `name.R`, `name.G` and `name.B`, for example. All channels of a file
+/// have the same size.
+struct ImageLayer {
+  std::string name;
+  std::string components;  ///< the last letters of the names of the channels: one or three
+  Image image;             ///< with one component, it is in all channels
+  bool precise = false;    ///< stored as floats whatever the format: depths, for which halves are too coarse
+};
+
 /// Throws std::runtime_error unless the name ends in .exr or .png. Called before rendering, so that a wrong name is
 /// found early.
 void checkImageName(const std::filesystem::path& path);
 
-/// Writes the file atomically. .exr: 32-bit floating-point RGB with the attributes; .png: 8-bit sRGB, clipped to
-/// [0, 1], without the attributes. Throws std::runtime_error that names the file.
-void writeImage(const std::filesystem::path& path, const Image& image, const ImageAttributes& attributes = {});
+/// Writes the file atomically. .exr: floating-point RGB and the layers, with the attributes; .png: 8-bit sRGB, clipped
+/// to [0, 1], without attributes and layers. Returns the number of finite values that are too large for the type half
+/// and were replaced by the nearest half. Throws std::runtime_error that names the file.
+std::size_t writeImage(const std::filesystem::path& path, const Image& image, const ImageAttributes& attributes = {},
+                       std::span<const ImageLayer> layers = {}, const ExrFormat& format = {});
 
 /// The attributes of type double and string of an .exr file; empty for other files. Throws std::runtime_error that
 /// names the file.

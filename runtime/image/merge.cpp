@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
@@ -162,28 +163,89 @@ ImageAttributes mergedAttributes(const std::vector<Part>& parts, const std::vect
   return attributes;
 }
 
-/// sums: receives the sums of the luminances of each part.
-Image weightedMean(const std::vector<Part>& parts, std::vector<double>& sums) {
-  Image result;
-  std::vector<Eigen::Array3d> sum;
-  double samples = 0;
-  for (const Part& part : parts) {
-    const Image image = readImage(part.path);
-    if (sum.empty()) {
-      result = Image(image.width, image.height);
-      sum.assign(image.pixels.size(), Eigen::Array3d::Zero());
-    }
-    if (image.width != result.width || image.height != result.height)
-      throw std::runtime_error(fmt::format("{}: has {}x{} pixels, but {} has {}x{}", part.path.string(), image.width,
-                                           image.height, parts.front().path.string(), result.width, result.height));
-    for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += part.samples * image.pixels[i].cast<double>();
-    samples += part.samples;
-    sums.push_back(0);
-    for (const Rgb& pixel : image.pixels) sums.back() += luminance(pixel);
-  }
-  for (std::size_t i = 0; i < sum.size(); ++i) result.pixels[i] = (sum[i] / samples).cast<float>();
-  return result;
+void checkSize(const Part& part, const Image& image, const Part& first, const Image& expected) {
+  if (image.width != expected.width || image.height != expected.height)
+    throw std::runtime_error(fmt::format("{}: has {}x{} pixels, but {} has {}x{}", part.path.string(), image.width,
+                                         image.height, first.path.string(), expected.width, expected.height));
 }
+
+/// Combines the colours and the AOVs of images, one after the other.
+class Merger {
+ public:
+  void add(const Part& part, const Part& first) {
+    const Image image = readImage(part.path);
+    Aovs aovs = readAovs(part.path);
+    if (samples_ == 0) start(image, aovs);
+    checkSize(part, image, first, picture_);
+    std::erase_if(aovs_, [&](const auto& entry) { return !aovs.contains(entry.first); });
+    for (auto& [aov, sums] : aovs_) addAov(aov, aovs.at(aov), image, part.samples, sums);
+    addTo(colours_, image, part.samples);
+    samples_ += part.samples;
+    luminances_.push_back(0);
+    for (const Rgb& pixel : image.pixels) luminances_.back() += luminance(pixel);
+  }
+
+  Image image() const { return quotient(colours_, samples_); }
+
+  Aovs aovs() const {
+    Aovs all;
+    for (const auto& [aov, sums] : aovs_) all.emplace(aov, quotient(sums, divisorOf(aov)));
+    return all;
+  }
+
+  /// The sums of the luminances of each image.
+  const std::vector<double>& luminances() const { return luminances_; }
+
+ private:
+  using Sums = std::vector<Eigen::Array3d>;
+
+  void start(const Image& image, const Aovs& aovs) {
+    picture_ = Image(image.width, image.height);
+    colours_.assign(image.pixels.size(), Eigen::Array3d::Zero());
+    for (const auto& entry : aovs)
+      aovs_[entry.first].assign(image.pixels.size(),
+                                Eigen::Array3d::Constant(entry.first == Aov::depth ? kFarthest : 0.0));
+  }
+
+  void addAov(Aov aov, const Image& values, const Image& image, double samples, Sums& sums) const {
+    if (aov == Aov::variance) return addSquares(values, image, samples, sums);
+    if (aov != Aov::depth) return addTo(sums, values, aov == Aov::samples ? 1.0 : samples);
+    for (std::size_t i = 0; i < sums.size(); ++i) sums[i] = sums[i].min(values.pixels[i].cast<double>());
+  }
+
+  // The sums of squared deviations from the mean of all samples so far (Chan et al. 1979, "Updating Formulae and a
+  // Pairwise Algorithm for Computing Sample Variances").
+  void addSquares(const Image& variance, const Image& image, double samples, Sums& sums) const {
+    const double between = samples_ > 0 ? samples_ * samples / (samples_ + samples) : 0.0;
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+      sums[i] += samples * (samples - 1) * variance.pixels[i].cast<double>();
+      if (between > 0) sums[i] += between * (image.pixels[i].cast<double>() - colours_[i] / samples_).square();
+    }
+  }
+
+  static void addTo(Sums& sums, const Image& image, double weight) {
+    for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += weight * image.pixels[i].cast<double>();
+  }
+
+  double divisorOf(Aov aov) const {
+    if (aov == Aov::variance) return std::max(1.0, samples_ * (samples_ - 1));
+    return aov == Aov::depth || aov == Aov::samples ? 1.0 : samples_;
+  }
+
+  Image quotient(const Sums& sums, double divisor) const {
+    Image result = picture_;
+    for (std::size_t i = 0; i < sums.size(); ++i) result.pixels[i] = (sums[i] / divisor).cast<float>();
+    return result;
+  }
+
+  static constexpr double kFarthest = std::numeric_limits<float>::max();
+
+  Image picture_;  // black
+  Sums colours_;
+  std::map<Aov, Sums> aovs_;
+  double samples_ = 0;
+  std::vector<double> luminances_;
+};
 
 }  // namespace
 
@@ -215,9 +277,9 @@ MergedImage mergeImages(std::span<const std::filesystem::path> paths) {
     checkSameScene(parts.front(), parts.back());
     for (std::size_t i = 0; i + 1 < parts.size(); ++i) checkDisjoint(parts[i], parts.back());
   }
-  std::vector<double> sums;
-  Image image = weightedMean(parts, sums);
-  return {std::move(image), mergedAttributes(parts, sums)};
+  Merger merger;
+  for (const Part& part : parts) merger.add(part, parts.front());
+  return {merger.image(), mergedAttributes(parts, merger.luminances()), merger.aovs()};
 }
 
 Image varianceOfMerged(std::span<const std::filesystem::path> paths, const Image& merged) {

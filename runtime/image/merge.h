@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/image/image_output.h"
+#include "runtime/image/aov.h"
 
 namespace lobe {
 
@@ -34,14 +34,17 @@ double samplesOf(const std::filesystem::path& path);
 struct MergedImage {
   Image image;
   ImageAttributes attributes;
+  Aovs aovs;
 };
 
 /// The mean of the images weighted by their samples per pixel. Attributes that all images have in common are kept, and
 /// samples is the sum. fireflyCut is combined; if
-/// parts have different limits, fireflyLimit is dropped as any attribute that differs. The ranges are stored as seed
-/// and sampleOffset if they form one range, otherwise as sampleRanges, so that a merged image can be merged again.
-/// Throws std::runtime_error that names the file or files if an image does not record its number of samples, sizes or
-/// scenes differ, or two images contain samples of the same range.
+/// parts have different limits, fireflyLimit is dropped as any attribute that differs. AOVs that all images have in
+/// common are those of all samples together, up to rounding: means of albedo and normal, the smallest depth, the sum of
+/// the samples, and the variance of the pixel, to which the differences between the images add. The ranges are stored
+/// as seed and sampleOffset if they form one range, otherwise as sampleRanges, so that a merged image can be merged
+/// again. Throws std::runtime_error that names the file or files if an image does not record its number of samples,
+/// sizes or scenes differ, or two images contain samples of the same range.
 MergedImage mergeImages(std::span<const std::filesystem::path> paths);
 
 /// The variance of each pixel and channel of the merged image, from the differences between its parts, which must have

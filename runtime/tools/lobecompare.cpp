@@ -1,5 +1,6 @@
-// lobecompare: measures the errors of images against a reference or the variance of a pair, or merges images.
+// lobecompare: measures the errors of images against a reference or the variance of a pair, merges or converts images.
 
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <stdexcept>
@@ -15,6 +16,7 @@
 #include "runtime/image/image_output.h"
 #include "runtime/image/merge.h"
 #include "runtime/image/pair_variance.h"
+#include "runtime/tools/exr_options.h"
 #include "runtime/tools/json_text.h"
 #include "runtime/tools/tool.h"
 
@@ -23,7 +25,9 @@ namespace {
 struct Arguments {
   std::string reference;
   std::vector<std::string> images, others;
-  bool json = false, pair = false;
+  bool json = false, pair = false, png = false;
+  float exposure = 0;
+  lobe::ExrFormat exr;
   std::string map, merge, variance;
   int shrink = 1;
 };
@@ -34,10 +38,11 @@ struct Comparison {
 };
 
 void declare(CLI::App& app, Arguments& arguments) {
-  app.add_option("REFERENCE", arguments.reference, "Reference image; with --merge or --pair, the first of the images")
+  app.add_option("REFERENCE", arguments.reference,
+                 "Reference image; with --merge or --pair, the first of the images; with --png, the input")
       ->required()
       ->type_name("FILE");
-  app.add_option("IMAGE", arguments.images, "Images of the same size as the reference")
+  app.add_option("IMAGE", arguments.images, "Images of the same size as the reference; with --png, the output")
       ->required()
       ->type_name("FILE")
       ->default_str("");
@@ -77,6 +82,15 @@ void declare(CLI::App& app, Arguments& arguments) {
                  "With --merge of images with different seeds: write the variance of the merged image to this EXR file")
       ->type_name("OUT.exr")
       ->needs(merge);
+  for (CLI::Option* option : lobe::addExrOptions(app, arguments.exr)) option->needs(merge);
+  auto* png = app.add_flag("--png", arguments.png,
+                           "Convert the first image to the second, a PNG file in sRGB as loberender writes it, instead "
+                           "of comparing them");
+  png->excludes(json)->excludes(map)->excludes(shrink)->excludes(merge)->excludes(agreement)->excludes(pair);
+  app.add_option("--exposure", arguments.exposure, "Multiply the image by 2 to this power for --png")
+      ->check(CLI::Range(-100.0f, 100.0f))
+      ->type_name("STOPS")
+      ->needs(png);
 }
 
 std::vector<std::filesystem::path> all(const Arguments& arguments) {
@@ -94,7 +108,16 @@ void checkMerge(const Arguments& arguments) {
   if (arguments.variance == arguments.merge) throw lobe::UsageError("--merge and --variance must name different files");
 }
 
+void checkPng(const Arguments& arguments) {
+  if (arguments.images.size() != 1) throw lobe::UsageError("--png takes two files, the input and the output");
+  const std::filesystem::path output = arguments.images.front();
+  if (output.extension() != ".png")
+    throw lobe::UsageError(fmt::format("{}: --png writes its second file, which must be a .png file", output.string()));
+  lobe::checkNotRead(output, {arguments.reference});
+}
+
 void checkArguments(const Arguments& arguments) {
+  if (arguments.png) return checkPng(arguments);
   if (!arguments.merge.empty()) checkMerge(arguments);
   if (arguments.pair && arguments.images.size() != 1) throw lobe::UsageError("--pair takes two images");
   for (const std::filesystem::path output : {arguments.merge, arguments.variance, arguments.map})
@@ -240,11 +263,20 @@ void merge(const Arguments& arguments) {
   const lobe::MergedImage merged = lobe::mergeImages(all(arguments));
   if (!arguments.variance.empty())
     lobe::writeImage(arguments.variance, lobe::varianceOfMerged(all(arguments), merged.image));
-  lobe::writeImage(arguments.merge, merged.image, merged.attributes);
+  const std::size_t clamped =
+      lobe::writeImage(arguments.merge, merged.image, merged.attributes, lobe::layersOf(merged.aovs), arguments.exr);
+  lobe::noteClamped("lobecompare", arguments.merge, clamped);
+}
+
+void convert(const Arguments& arguments) {
+  lobe::Image image = lobe::readImage(arguments.reference);
+  for (lobe::Rgb& pixel : image.pixels) pixel *= std::exp2(arguments.exposure);
+  lobe::writeImage(arguments.images.front(), image);
 }
 
 void run(const Arguments& arguments) {
   checkArguments(arguments);
+  if (arguments.png) return convert(arguments);
   if (!arguments.merge.empty()) return merge(arguments);
   if (arguments.pair) return comparePair(arguments);
   if (!arguments.others.empty()) return testAgreement(arguments);
@@ -263,6 +295,7 @@ int main(int argc, char** argv) {
   Arguments arguments;
   return lobe::runTool(
       "lobecompare",
-      "Measures the errors of images against a reference or the variance of a pair of images, or merges images.", argc,
-      argv, [&](CLI::App& app) { declare(app, arguments); }, [&] { run(arguments); });
+      "Measures the errors of images against a reference or the variance of a pair of images, merges or converts "
+      "images.",
+      argc, argv, [&](CLI::App& app) { declare(app, arguments); }, [&] { run(arguments); });
 }

@@ -1,17 +1,37 @@
 // loberender: trains the illumination of a scene and renders it.
 
+#include <algorithm>
 #include <cstdint>
+#include <sstream>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <oneapi/tbb/global_control.h>
 
 #include "runtime/tools/check_report.h"
+#include "runtime/tools/exr_options.h"
 #include "runtime/tools/render_run.h"
 #include "runtime/tools/tool.h"
 
 namespace {
 
 using namespace lobe;
+
+/// Parses the list of --aov.
+std::set<Aov> parseAovs(const std::string& text) {
+  std::set<Aov> aovs;
+  std::istringstream list(text);
+  for (std::string name; std::getline(list, name, ',');) {
+    const auto found = std::ranges::find(kAovNames, name);
+    if (name == "all")
+      for (std::size_t i = 0; i < kAovNames.size(); ++i) aovs.insert(static_cast<Aov>(i));
+    else if (found != kAovNames.end())
+      aovs.insert(static_cast<Aov>(found - kAovNames.begin()));
+    else
+      throw UsageError(fmt::format("--aov: '{}' is not one of {}, or all", name, fmt::join(kAovNames, ", ")));
+  }
+  return aovs;
+}
 
 /// Parses two numbers separated by `sign`; `form` describes the format in the error message.
 std::pair<int, int> parsePair(const std::string& option, const std::string& text, char sign, const char* form) {
@@ -49,7 +69,7 @@ const std::vector<RenamedOption> kRenamedOptions{
 
 struct Options {
   RenderJob job;
-  std::string size, record;
+  std::string size, record, aovs;
   int threads = 0;
   bool check = false, json = false;
   // Options that some integrators ignore.
@@ -124,6 +144,11 @@ void declare(CLI::App& app, Options& options) {
       ->type_name("FILE")
       ->default_str("")
       ->allow_extra_args(false);  // otherwise it would take the scene after it as another picture
+  app.add_option("--aov", options.aovs,
+                 fmt::format("AOVs that are stored with the picture in .exr files, separated by commas: {}, or all",
+                             fmt::join(kAovNames, ", ")))
+      ->type_name("LIST");
+  addExrOptions(app, job.exr);
   app.add_option("--cache", job.cacheFolder, "Folder of the BRDF caches made by lobefit")
       ->type_name("DIR")
       ->capture_default_str();
@@ -238,6 +263,7 @@ void work(Options& options) {
   if (options.check)
     return reportCheck(options.job.scene, {options.job.definitions, options.job.lenient}, options.json, stdout);
   if (!options.size.empty()) options.job.size = parsePair("--size", options.size, 'x', "WIDTHxHEIGHT");
+  options.job.aovs = parseAovs(options.aovs);
   if (!options.record.empty()) options.job.record = parsePair("--record", options.record, ',', "X,Y");
   noteUnused(options);
   std::optional<oneapi::tbb::global_control> limit;

@@ -5,10 +5,11 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
-#include "runtime/image/image.h"
+#include "runtime/image/aov.h"
 #include "runtime/render/gradients/poisson.h"
 #include "runtime/render/integrators/bidirectional_integrator.h"
 #include "runtime/render/integrators/renderer.h"
@@ -68,6 +69,9 @@ struct RenderJob {
   std::filesystem::path illumination, saveIllumination;
 
   std::filesystem::path reference, convergence, stats;  ///< empty: not used
+
+  std::set<Aov> aovs;  ///< stored with the picture in .exr files
+  ExrFormat exr;       ///< of .exr files
 
   /// Seconds between snapshots of the outputs while rendering; 0: none. Empty: kSnapshotSeconds if the run is expected
   /// to take longer than kLongRun, or writes checkpoints.

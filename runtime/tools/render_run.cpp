@@ -19,9 +19,11 @@
 #include "runtime/core/atomic_file.h"
 #include "runtime/core/stopwatch.h"
 #include "runtime/image/image_output.h"
+#include "runtime/render/integrators/features.h"
 #include "runtime/render/integrators/renderer.h"
 #include "runtime/render/training/light_learning.h"
 #include "runtime/tools/checkpoint.h"
+#include "runtime/tools/exr_options.h"
 #include "runtime/tools/json_text.h"
 #include "runtime/tools/render_files.h"
 #include "runtime/tools/render_report.h"
@@ -71,6 +73,11 @@ std::optional<Receiver> receiverFor(const RenderJob& job, const RenderScene& sce
   }
 }
 
+/// Whether it is accumulated by a FeatureFilm.
+bool isFeature(Aov aov) {
+  return aov == Aov::albedo || aov == Aov::normal || aov == Aov::depth;
+}
+
 /// Draws the record of --record. If no record serves the surface, prints a warning and the run continues.
 void drawRecord(const RenderJob& job, const RenderScene& scene, const Receiver& receiver,
                 TrainedIllumination& training) {
@@ -106,7 +113,7 @@ class Run {
   void readIllumination(const IlluminationFile& file, const std::filesystem::path& path);
   void makeGuiding();
   void saveTraining();
-  RenderOptions options() const;
+  RenderOptions options();
   double fractionDone() const;
   bool snapshotIsDue() const;
   void snapshot();
@@ -116,6 +123,8 @@ class Run {
   double prepared() const { return guiding_.seconds(); }
   const Film& film() const { return gradients_ ? gradients_->pixels() : *film_; }
   ReconstructedImage picture() const;
+  void addFeatures();
+  Image imageOf(Aov aov) const;
 
   const RenderJob& job_;
   const StopFlag& stop_;
@@ -132,6 +141,7 @@ class Run {
   AnyIntegrator integrator_;
   std::optional<Film> film_;
   std::optional<GradientFilm> gradients_;  // replaces film_ with --gradients
+  std::optional<FeatureFilm> features_;    // for --aov
   RenderResult result_;
   OutputErrors errors_;
   Stopwatch sinceSnapshot_;
@@ -167,6 +177,7 @@ void Run::prepare() {
     film_.emplace(camera_->width(), camera_->height());
   if (!job_.checkpoint.empty() && film().pixels().size() > kMaxCheckpointPixels)
     throw std::runtime_error(fmt::format("--checkpoint: a checkpoint holds at most {} pixels", kMaxCheckpointPixels));
+  if (std::ranges::any_of(job_.aovs, isFeature)) features_.emplace(camera_->width(), camera_->height());
   const std::optional<Receiver> receiver = receiverFor(job_, *renderScene_, *camera_);
   if (job_.guided()) makeGuiding();
   if (receiver) drawRecord(job_, *renderScene_, *receiver, guiding_.training);
@@ -233,12 +244,13 @@ void Run::saveTraining() {
   for (const std::string& error : ofCheckpoint.all()) printWarning(kTool, error);
 }
 
-RenderOptions Run::options() const {
+RenderOptions Run::options() {
   RenderOptions options{job_.seed, job_.samples, std::nullopt, job_.sampling, job_.sampleOffset};
   if (job_.seconds) options.seconds = std::max(*job_.seconds - prepared(), 1e-3);
   if (const double every = job_.snapshotEvery.value_or(RenderJob::kSnapshotSeconds); every > 0)
     options.longestWave = every;
   options.stop = &stop_;
+  options.withWave = [this] { addFeatures(); };
   return options;
 }
 
@@ -263,6 +275,7 @@ void Run::snapshot() {
 
 void Run::render() {
   saveTraining();
+  addFeatures();  // of the samples of the run that this one resumes
   Progress progress("rendering", 1);
   double done = 0;
   sinceSnapshot_ = Stopwatch();
@@ -288,15 +301,29 @@ ReconstructedImage Run::picture() const {
   return gradients_ ? gradients_->reconstruct(*job_.gradients) : ReconstructedImage{film_->mean(), 0};
 }
 
+void Run::addFeatures() {
+  if (features_) features_->addMissing(film(), *renderScene_, *camera_, options());
+}
+
+Image Run::imageOf(Aov aov) const {
+  if (aov == Aov::albedo) return features_->albedo();
+  if (aov == Aov::normal) return features_->normal();
+  if (aov == Aov::depth) return features_->depth();
+  return aov == Aov::variance ? film().varianceOfMean() : film().counts();
+}
+
 void Run::writeOutputs(OutputErrors& errors) const {
   const RunResult result{result_, guiding_, film()};
   const std::uint64_t hash = pictureHash(*scene_);
+  Aovs aovs;
+  for (const Aov aov : job_.aovs) aovs.emplace(aov, imageOf(aov));
+  const std::vector<ImageLayer> layers = layersOf(aovs);
   for (const auto& output : job_.outputs)
     errors.attempt(output, [&] {
       const ReconstructedImage written = picture();
       ImageAttributes all = attributes(job_, hash, result);
       if (gradients_) all["clampedFraction"] = written.clampedFraction;
-      writeImage(output, written.image, all);
+      noteClamped(kTool, output, writeImage(output, written.image, all, layers, job_.exr));
     });
   errors.attempt(job_.convergence, [&] { log_->write(); });
   if (!job_.stats.empty())

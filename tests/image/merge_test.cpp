@@ -156,3 +156,51 @@ TEST_CASE("render: lobecompare --merge writes the merged image") {
   CHECK(code("--merge " + out + " " + p.paths[0].string() + " " + p.paths[0].string()) == 1);
   CHECK(code("--merge /nowhere/out.exr " + both) == 1);
 }
+
+TEST_CASE("render: merged AOVs are those of all samples together") {
+  // Pixels with known samples, in two parts of 3 and 5 of them.
+  Sampler rng(1, 2, 3);
+  constexpr int kWidth = 4, kHeight = 3;
+  const auto write = [&](const std::filesystem::path& path, const std::vector<std::vector<float>>& samples) {
+    Image mean(kWidth, kHeight), variance = mean, depth = mean, count = mean, albedo = mean;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      Moments moments;
+      for (const float value : samples[i]) moments.add(value);
+      mean.pixels[i] = grey(static_cast<float>(moments.mean()));
+      variance.pixels[i] = grey(static_cast<float>(moments.error() * moments.error()));
+      depth.pixels[i] = grey(*std::ranges::min_element(samples[i]));
+      count.pixels[i] = grey(static_cast<float>(samples[i].size()));
+      albedo.pixels[i] = mean.pixels[i] * Rgb(1, 2, 3);
+    }
+    const Aovs aovs{{Aov::albedo, albedo}, {Aov::depth, depth}, {Aov::variance, variance}, {Aov::samples, count}};
+    writeImage(path, mean, {{"samples", static_cast<double>(samples[0].size())}}, layersOf(aovs));
+  };
+  std::vector<std::vector<float>> first(kWidth * kHeight), second = first, all = first;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    for (int s = 0; s < 3; ++s) first[i].push_back(10 + rng.uniform());
+    for (int s = 0; s < 5; ++s) second[i].push_back(11 + rng.uniform());
+    all[i] = first[i];
+    all[i].insert(all[i].end(), second[i].begin(), second[i].end());
+  }
+  const Folder folder;
+  write(folder / "a.exr", first);
+  write(folder / "b.exr", second);
+  write(folder / "c.exr", all);
+  const std::vector<std::filesystem::path> parts{folder / "a.exr", folder / "b.exr"};
+  const Aovs merged = mergeImages(parts).aovs, whole = readAovs(folder / "c.exr");
+  REQUIRE(merged.size() == 4);
+  for (const auto& [aov, image] : whole)
+    for (std::size_t i = 0; i < image.pixels.size(); ++i)
+      CHECK((merged.at(aov).pixels[i] / image.pixels[i] - 1).abs().maxCoeff() < 1e-5f);
+}
+
+TEST_CASE("render: merged images keep the AOVs that all of them have") {
+  const Folder folder;
+  const Image image(2, 2, grey(1));
+  writeImage(folder / "a.exr", image, {{"samples", 1.0}}, layersOf({{Aov::normal, image}, {Aov::depth, image}}));
+  writeImage(folder / "b.exr", image, {{"samples", 1.0}}, layersOf({{Aov::depth, image}, {Aov::albedo, image}}));
+  const std::vector<std::filesystem::path> parts{folder / "a.exr", folder / "b.exr"};
+  const Aovs merged = mergeImages(parts).aovs;
+  CHECK(merged.size() == 1);
+  CHECK(merged.contains(Aov::depth));
+}

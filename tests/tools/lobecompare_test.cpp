@@ -85,3 +85,50 @@ TEST_CASE("render: lobecompare prints error metrics as text and JSON") {
     CHECK(missing.error.find("missing.exr") != std::string::npos);
   }
 }
+
+TEST_CASE("render: lobecompare --png writes the picture as loberender does") {
+  const Folder folder;
+  const std::string input = folder / "a.exr", output = folder / "a.png", direct = folder / "b.png";
+  Image image(3, 2, Rgb(0.2f, 0.4f, 3.0f));
+  writeImage(input, image);
+  writeImage(direct, image);
+  REQUIRE(lobecompare("--png " + input + " " + output).code == 0);
+  CHECK(readFile(output) == readFile(direct));
+  for (Rgb& pixel : image.pixels) pixel *= 0.25f;
+  writeImage(direct, image);
+  REQUIRE(lobecompare("--png " + input + " " + output + " --exposure -2").code == 0);
+  CHECK(readFile(output) == readFile(direct));
+  SECTION("faults") {
+    const auto fault = [&](const std::string& arguments, int code) {
+      const ToolRun run = lobecompare(arguments);
+      CAPTURE(arguments, run.error);
+      CHECK(run.code == code);
+      CHECK(lineCount(run.error) == 1);
+      return run.error;
+    };
+    CHECK_THAT(fault("--png " + input + " " + input, 2), Catch::Contains(".png"));
+    CHECK_THAT(fault("--png " + output + " " + output, 2), Catch::Contains("a.png"));
+    CHECK_THAT(fault("--png " + input + " " + output + " " + direct, 2), Catch::Contains("two files"));
+    CHECK_THAT(fault("--png " + (folder / "c.exr").string() + " " + output, 1), Catch::Contains("c.exr: no such file"));
+    CHECK_THAT(fault("--png " + input + " /nowhere/a.png", 1), Catch::Contains("/nowhere/a.png"));
+    CHECK(fault("--png --json " + input + " " + output, 2).find("--json") != std::string::npos);
+    CHECK_THAT(fault("--exposure 1 " + input + " " + input, 2), Catch::Contains("--png"));
+    CHECK_THAT(fault("--exr-type half " + input + " " + input, 2), Catch::Contains("--merge"));
+    CHECK(folder.files() == 3);
+    CHECK(readFile(output) == readFile(direct));
+  }
+}
+
+TEST_CASE("render: lobecompare --merge writes halves") {
+  const Folder folder;
+  const std::string a = folder / "a.exr", b = folder / "b.exr", merged = folder / "merged.exr";
+  writeImage(a, Image(2, 2, grey(1e6f)), {{"samples", 1.0}});
+  writeImage(b, Image(2, 2, grey(1)), {{"samples", 3.0}});
+  const ToolRun run = lobecompare("--merge " + merged + " --exr-type half --exr-compression piz " + a + " " + b);
+  CHECK(run.code == 0);
+  CHECK(run.error ==
+        fmt::format("lobecompare: note: {}: 12 values are too large for --exr-type half, and are stored as "
+                    "65504\n",
+                    merged));
+  CHECK(readImage(merged).at(0, 0).x() == kLargestHalf);
+}

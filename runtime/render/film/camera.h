@@ -73,6 +73,9 @@ class RayCamera {
   /// 8.3). ray: as returned by the functions above.
   float density(const Ray& ray, float distance) const;
 
+  /// The distance of a point from the lens along the viewing direction; negative behind the camera.
+  float depthOf(const Vec3& point) const { return (point - position_).dot(axis_); }
+
   /// How a point is seen through the point `lens` of the unit disc; nullopt if it is behind the camera, outside the
   /// clip planes, or too far outside the image to contribute to a pixel.
   std::optional<CameraView> view(const Vec3& point, const Vec2& lens) const;

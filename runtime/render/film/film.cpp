@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace lobe {
 namespace {
@@ -43,10 +42,14 @@ Image Film::mean() const {
 
 Image Film::varianceOfMean() const {
   return map([](const Pixel& p, int c) {
-    if (p.count < 2) return std::numeric_limits<double>::infinity();
+    if (p.count < 2) return 0.0;
     const double n = p.count;
     return std::max(0.0, p.squares[c] - p.sum[c] * p.sum[c] / n) / (n * (n - 1.0));
   });
+}
+
+Image Film::counts() const {
+  return map([](const Pixel& p, int) { return p.count; });
 }
 
 std::pair<std::uint32_t, std::uint32_t> Film::sampleRange() const {

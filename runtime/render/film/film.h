@@ -36,8 +36,12 @@ class Film {
   /// The mean of the samples of each pixel; black for pixels without samples.
   Image mean() const;
 
-  /// The unbiased variance of each pixel's mean; infinite for pixels with fewer than two samples.
+  /// The variance of each pixel's mean, estimated from the differences among its samples: unbiased if they are
+  /// independent, and too large on average if they are stratified. 0 for pixels with fewer than two samples.
   Image varianceOfMean() const;
+
+  /// The number of samples that each mean is of, in all channels.
+  Image counts() const;
 
   const Pixel& pixel(int x, int y) const { return pixels_[static_cast<std::size_t>(y) * width_ + x]; }
   const std::vector<Pixel>& pixels() const { return pixels_; }

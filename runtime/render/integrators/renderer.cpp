@@ -50,17 +50,12 @@ class Tiles {
   }
 
   /// For sample s, counted from RenderOptions::firstSample.
-  Sampler sampler(int x, int y, int s) const {
-    return options_.sampling == PixelSampling::sobol ? Sampler::stratified(options_.seed, pixelOf(x, y), indexOf(s))
-                                                     : Sampler(options_.seed, pixelOf(x, y), indexOf(s));
-  }
+  Sampler sampler(int x, int y, int s) const { return options_.sampler(pixelOf(x, y), s); }
   /// Independent numbers for the light path of the same sample.
   Sampler lightSampler(int x, int y, int s) const {
-    return Sampler(options_.seed ^ kLightSeed, pixelOf(x, y), indexOf(s));
+    return Sampler(options_.seed ^ kLightSeed, pixelOf(x, y), options_.indexOf(s));
   }
-  std::uint32_t indexOf(int s) const {
-    return static_cast<std::uint32_t>(options_.firstSample) + static_cast<std::uint32_t>(s);
-  }
+  int indexOf(int s) const { return static_cast<int>(options_.indexOf(s)); }
   std::uint64_t pixelOf(int x, int y) const { return static_cast<std::uint64_t>(y) * camera_.width() + x; }
 
  private:
@@ -239,6 +234,11 @@ void RenderOptions::validate() const {
   if (seconds && !(*seconds > 0.0)) throw std::runtime_error(fmt::format("seconds: {} is not positive", *seconds));
 }
 
+Sampler RenderOptions::sampler(std::uint64_t pixel, int s) const {
+  return sampling == PixelSampling::sobol ? Sampler::stratified(seed, pixel, indexOf(s))
+                                          : Sampler(seed, pixel, indexOf(s));
+}
+
 namespace {
 
 template <class Renderer>
@@ -252,6 +252,7 @@ RenderResult renderWaves(Renderer renderer, const Film& film, const RenderOption
   while (const int samples = plan.next(progress)) {
     const Stopwatch watch;
     const Wave wave = renderer.render(progress.samples + samples);
+    if (options.withWave) options.withWave();
     result.statistics += wave.statistics;
     progress.seconds += watch.seconds();
     progress.samples = static_cast<int>(film.sampleRange().first);

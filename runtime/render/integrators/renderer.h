@@ -25,7 +25,14 @@ struct RenderOptions {
   int firstSample = 0;             ///< index of the first sample of every pixel; firstSample + samples must fit an int
   double longestWave = kInfinity;  ///< approximate limit in seconds of the time between calls of AfterWave
   const StopFlag* stop = nullptr;  ///< ends rendering after the current tiles when it is set
+  /// Called after the samples of each wave, also of one that was stopped, while no thread writes to the film; empty:
+  /// not used. Its time is part of the rendering time.
+  std::function<void()> withWave = {};
 
+  /// The random numbers of sample s, counted from firstSample, of a pixel, counted row by row from the top.
+  Sampler sampler(std::uint64_t pixel, int s) const;
+  /// The index of the sample s among all samples of its pixel.
+  std::uint32_t indexOf(int s) const { return static_cast<std::uint32_t>(firstSample) + static_cast<std::uint32_t>(s); }
   /// Throws std::runtime_error that names the field.
   void validate() const;
 };
