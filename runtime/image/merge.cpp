@@ -90,6 +90,12 @@ Part describe(const std::filesystem::path& path) {
   if (!samples || *samples == 0)
     throw std::runtime_error(
         fmt::format("{}: does not say how many samples it has; merge .exr files written by loberender", path.string()));
+  const auto gradients = find<std::string>(part.attributes, "gradients");
+  if (gradients && gradients->starts_with("l1"))
+    throw std::runtime_error(fmt::format(
+        "{}: pictures of --gradients l1 cannot be merged, because their mean keeps the bias of few samples; "
+        "render all samples in one run, or with --gradients l2",
+        path.string()));
   part.samples = static_cast<double>(*samples);
   part.ranges = rangesOf(path, part.attributes);
   return part;
@@ -143,10 +149,26 @@ std::optional<double> cutFraction(const std::vector<Part>& parts, const std::vec
   return all > 0 ? cut / all : 0;
 }
 
+/// The fraction of the light that was added by replacing negative pixels by zero (the attribute clampedFraction of
+/// pictures of --gradients), for the parts together; nullopt if no part has one.
+std::optional<double> clampedFraction(const std::vector<Part>& parts, const std::vector<double>& sums) {
+  double added = 0, all = 0;
+  bool any = false;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const std::optional<double> fraction = find<double>(parts[i].attributes, "clampedFraction");
+    any = any || fraction;
+    added += parts[i].samples * sums[i] * fraction.value_or(0);
+    all += parts[i].samples * sums[i];
+  }
+  if (!any) return std::nullopt;
+  return all > 0 ? added / all : 0;
+}
+
 ImageAttributes mergedAttributes(const std::vector<Part>& parts, const std::vector<double>& sums) {
   ImageAttributes attributes = common(parts);
   for (const char* ofOne : {"sampleOffset", "sampleRanges", "seconds"}) attributes.erase(ofOne);
   if (const std::optional<double> cut = cutFraction(parts, sums)) attributes["fireflyCut"] = *cut;
+  if (const std::optional<double> clamped = clampedFraction(parts, sums)) attributes["clampedFraction"] = *clamped;
   double samples = 0;
   std::vector<SampleRange> ranges;
   for (const Part& part : parts) {

@@ -38,13 +38,15 @@ struct MergedImage {
 };
 
 /// The mean of the images weighted by their samples per pixel. Attributes that all images have in common are kept, and
-/// samples is the sum. fireflyCut is combined; if
-/// parts have different limits, fireflyLimit is dropped as any attribute that differs. AOVs that all images have in
+/// samples is the sum. fireflyCut and clampedFraction are combined; if parts have different limits, fireflyLimit is
+/// dropped as any attribute that differs. Reconstructions from gradients in L2 are linear in the samples, except for
+/// the replacement of negative pixels, so that their mean is an image of all samples. AOVs that all images have in
 /// common are those of all samples together, up to rounding: means of albedo and normal, the smallest depth, the sum of
 /// the samples, and the variance of the pixel, to which the differences between the images add. The ranges are stored
 /// as seed and sampleOffset if they form one range, otherwise as sampleRanges, so that a merged image can be merged
 /// again. Throws std::runtime_error that names the file or files if an image does not record its number of samples,
-/// sizes or scenes differ, or two images contain samples of the same range.
+/// sizes or scenes differ, two images contain samples of the same range, or an image was reconstructed in L1, which is
+/// biased.
 MergedImage mergeImages(std::span<const std::filesystem::path> paths);
 
 /// The variance of each pixel and channel of the merged image, from the differences between its parts, which must have

@@ -111,6 +111,26 @@ TEST_CASE("render: merging combines the fractions of light that a limit has cut 
   CHECK(std::get<double>(all.at("fireflyCut")) == Approx((3 * 1 + 9 * 1) / (3 * 3.0 + 9 * 5 + 6)));
 }
 
+TEST_CASE("render: pictures from gradients are merged if they are reconstructed in L2") {
+  ImageAttributes first = madeOf("path", 1, 0, 3), second = madeOf("path", 2, 0, 9);
+  first["gradients"] = second["gradients"] = "l2 (unbiased before clamping)";
+  first["clampedFraction"] = 0.5, second["clampedFraction"] = 0.25;
+  Pictures p;
+  p.add(2, first);
+  p.add(4, second);
+  const ImageAttributes both = mergeImages(p.paths).attributes;
+  CHECK(both.at("gradients") == first.at("gradients"));
+  CHECK(std::get<double>(both.at("clampedFraction")) == Approx((3 * 2 * 0.5 + 9 * 4 * 0.25) / (3 * 2 + 9 * 4)));
+  p.add(1, madeOf("path", 3, 0, 6));  // without gradients
+  const ImageAttributes all = mergeImages(p.paths).attributes;
+  CHECK(all.count("gradients") == 0);
+  CHECK(std::get<double>(all.at("clampedFraction")) == Approx((3 * 2 * 0.5 + 9 * 4 * 0.25) / (3 * 2 + 9 * 4 + 6 * 1)));
+  ImageAttributes biased = madeOf("path", 4, 0, 6);
+  biased["gradients"] = "l1 (biased)";
+  p.add(1, biased);
+  CHECK_THAT(p.fault(), Catch::Contains(p.paths[3].string() + ": pictures of --gradients l1 cannot be merged"));
+}
+
 TEST_CASE("render: errors name the images that cannot be merged") {
   Pictures sizes;
   sizes.add(1, madeOf("path", 1, 0, 4));
