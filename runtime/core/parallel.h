@@ -1,8 +1,12 @@
 #pragma once
 // Parallel loops and sorting that either complete or throw.
 
+#include <algorithm>
 #include <stdexcept>
 
+#if defined(__SANITIZE_THREAD__)
+#include <sanitizer/tsan_interface.h>
+#endif
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
@@ -18,13 +22,50 @@ class LoopCancelled : public std::runtime_error {
   LoopCancelled() : std::runtime_error("cancelled by the failure of a parallel task") {}
 };
 
+/// Throws LoopCancelled if this runs in a loop or task that has been cancelled: for long work that is not a loop.
+inline void throwIfCancelled() {
+  if (tbb::is_current_task_group_canceling()) throw LoopCancelled();
+}
+
+/// Tells the thread sanitizer, which does not see into the library of oneTBB, that the bodies of a loop run after what
+/// precedes the loop and before what follows it, but in no order among each other. Does nothing without it.
+class ForkJoin {
+ public:
+  ForkJoin(const ForkJoin&) = delete;
+  ForkJoin& operator=(const ForkJoin&) = delete;
+#if defined(__SANITIZE_THREAD__)
+  ForkJoin() { __tsan_release(&fork_); }
+  ~ForkJoin() { __tsan_acquire(&join_); }
+  template <class Body, class... Arguments>
+  void run(const Body& body, const Arguments&... arguments) {
+    __tsan_acquire(&fork_);
+    const Release release{&join_};
+    body(arguments...);
+  }
+
+ private:
+  struct Release {
+    ~Release() { __tsan_release(join); }
+    char* join;
+  };
+  char fork_ = 0, join_ = 0;
+#else
+  ForkJoin() = default;
+  template <class Body, class... Arguments>
+  void run(const Body& body, const Arguments&... arguments) {
+    body(arguments...);
+  }
+#endif
+};
+
 /// Calls body(i) for every i in [begin, end) in parallel. Rethrows the exception of an iteration. If an exception in an
 /// enclosing loop cancels this one, tbb::parallel_for returns normally although some iterations did not run; this
 /// function throws LoopCancelled instead, so that incomplete results are never used.
 template <class Index, class Body>
 void parallelFor(Index begin, Index end, const Body& body) {
   tbb::task_group_context context;  // bound to the enclosing loop, if there is one, and cancelled with it
-  tbb::parallel_for(begin, end, body, context);
+  ForkJoin order;
+  tbb::parallel_for(begin, end, [&](Index i) { order.run(body, i); }, context);
   if (context.is_group_execution_cancelled()) throw LoopCancelled();
 }
 
@@ -32,16 +73,21 @@ void parallelFor(Index begin, Index end, const Body& body) {
 /// depend on threads. Throws LoopCancelled like parallelFor.
 template <class Range, class Less>
 void parallelSort(Range& range, const Less& less) {
+#if defined(__SANITIZE_THREAD__)
+  std::sort(range.begin(), range.end(), less);  // has the same result
+#else
   tbb::parallel_sort(range.begin(), range.end(), less);
-  if (tbb::is_current_task_group_canceling()) throw LoopCancelled();
+#endif
+  throwIfCancelled();
 }
 
 /// The same as parallelFor, with one task for each iteration, for iterations that take long.
 template <class Index, class Body>
 void parallelForEach(Index begin, Index end, const Body& body) {
   tbb::task_group_context context;
+  ForkJoin order;
   const auto run = [&](const tbb::blocked_range<Index>& range) {
-    for (Index i = range.begin(); i != range.end(); ++i) body(i);
+    for (Index i = range.begin(); i != range.end(); ++i) order.run(body, i);
   };
   tbb::parallel_for(tbb::blocked_range<Index>(begin, end, 1), run, tbb::simple_partitioner(), context);
   if (context.is_group_execution_cancelled()) throw LoopCancelled();
@@ -51,7 +97,8 @@ void parallelForEach(Index begin, Index end, const Body& body) {
 template <class... Functions>
 void parallelInvoke(const Functions&... functions) {
   tbb::task_group_context context;
-  tbb::parallel_invoke(functions..., context);
+  ForkJoin order;
+  tbb::parallel_invoke([&] { order.run(functions); }..., context);
   if (context.is_group_execution_cancelled()) throw LoopCancelled();
 }
 

@@ -205,7 +205,8 @@ void run(Options& o) {
   o.read.geometry = false;
   if (o.check) return reportCheck(o.scene, o.read, o.json, stdout);
   const StopFlag& stop = stopOnSignals();
-  const Scene scene = readScene(o.scene, o.read);
+  Scene scene;
+  stoppable(stop, "while the scene was read, so no cache is written", [&] { scene = readScene(o.scene, o.read); });
   for (const std::string& note : scene.notes) printNote("lobefit", note);
   for (const std::string& warning : scene.warnings) printWarning("lobefit", warning);
   const std::vector<CacheReport> reports = compileAll(planCompile(collectLobes(scene), o.compile), stop);

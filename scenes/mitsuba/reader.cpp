@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "runtime/core/parallel.h"
 #include "scenes/mitsuba/reader_emitters.h"
 #include "scenes/mitsuba/reader_parameters.h"
 #include "scenes/mitsuba/reader_sensor.h"
@@ -32,8 +33,10 @@ class SceneReader {
         emitters_(context, textures_) {}
 
   void read() {
-    for (const pugi::xml_node node : context_.file.scene().children())
+    for (const pugi::xml_node node : context_.file.scene().children()) {
+      throwIfCancelled();
       context_.attempt(fmt::format("{} is left out", nameOf(node)), [&] { readElement(node); });
+    }
     if (!sensor_ && context_.options.geometry)
       context_.unsupported(context_.file.scene(), "no sensor", "the scene has no <sensor>", "");
     emitters_.finish();

@@ -24,7 +24,8 @@ struct ReadOptions {
 };
 
 /// Reads the whole file, then throws SceneError with all faults found; with options.lenient, only if nothing is left to
-/// draw or there is no camera. Meshes are read in parallel with oneTBB.
+/// draw or there is no camera. Meshes are read in parallel with oneTBB. Throws LoopCancelled soon after a task in which
+/// this runs has been cancelled.
 Scene readScene(const std::filesystem::path& path, const ReadOptions& options = {});
 
 /// What readScene finds in a file.

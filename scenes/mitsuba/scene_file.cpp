@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "runtime/core/parallel.h"
 #include "scenes/mitsuba/file_text.h"
 
 namespace lobe {
@@ -111,6 +112,7 @@ SceneFile::SceneFile(const std::filesystem::path& path, const std::map<std::stri
       values_(definitions) {
   files_[0].lines = lineStarts(text_);
   do {
+    throwIfCancelled();
     parse();
     readDefaults();
     readFolders();
@@ -248,6 +250,7 @@ const SceneFile::Segment& SceneFile::segmentAt(std::size_t offset) const {
 
 void SceneFile::substitute(pugi::xml_node node) {
   if (std::string_view(node.name()) == "default") return;
+  throwIfCancelled();
   for (pugi::xml_attribute attribute : node.attributes())
     if (std::strchr(attribute.value(), '$')) attribute.set_value(substituted(attribute.value(), node).c_str());
   for (const pugi::xml_node child : node.children())
@@ -299,6 +302,7 @@ std::vector<std::string> SceneFile::names() const {
 void SceneFile::indexIds(pugi::xml_node node) {
   for (const pugi::xml_node child : node.children()) {
     if (child.type() != pugi::node_element) continue;
+    throwIfCancelled();
     const std::string id = child.attribute("id").value();
     const std::string_view name = child.name();
     if (!id.empty() && name != "ref" && name != "alias") {

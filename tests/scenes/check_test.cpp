@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <catch2/catch.hpp>
 
+#include "runtime/core/parallel.h"
 #include "tests/support/scenes_test_tools.h"
 
 namespace lobe {
@@ -131,6 +132,23 @@ TEST_CASE("scenes: checkScene reports whether a scene can be read and does not t
   REQUIRE(broken.faults.size() == 1);
   CHECK(!broken.readable);
   CHECK(check(sceneOf("<integrator type=\"volpath\"/><shape type=\"sphere\"/>")).notes.size() == 1);
+}
+
+TEST_CASE("scenes: reading ends early in a cancelled task, also where it has no parallel loop") {
+  ReadOptions materialsOnly;
+  materialsOnly.geometry = false;
+  tbb::task_group_context context(tbb::task_group_context::isolated);
+  tbb::task_group group(context);
+  bool cancelled = false;
+  group.run_and_wait([&] {
+    context.cancel_group_execution();
+    try {
+      readBody("<bsdf type=\"diffuse\"/>", materialsOnly);
+    } catch (const LoopCancelled&) {
+      cancelled = true;
+    }
+  });
+  CHECK(cancelled);
 }
 
 TEST_CASE("scenes: unused parameters cause a warning in old files and a fault in new ones") {
