@@ -1,12 +1,14 @@
 // lobedump FILE...: shows the content and the quality of BRDF caches (.lobe) and of trained illumination (.illum), as
-// tables, JSON, plots, point clouds or differences.
+// tables, JSON, plots, interactive pages, point clouds or differences.
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "fitter/compile.h"
+#include "runtime/core/atomic_file.h"
 #include "runtime/tools/cache_diff.h"
 #include "runtime/tools/cache_grid.h"
+#include "runtime/tools/cache_page.h"
 #include "runtime/tools/cache_plot.h"
 #include "runtime/tools/cache_report.h"
 #include "runtime/tools/illumination_report.h"
@@ -39,7 +41,7 @@ struct Options {
   bool records = false;
   bool json = false;
   bool diff = false;
-  std::string plot, scene, points;
+  std::string plot, html, scene, points;
   int record = -1;
   ReadOptions read;
 };
@@ -64,16 +66,25 @@ void declare(CLI::App& app, Options& o) {
       ->check(CLI::NonNegativeNumber)
       ->default_str("")
       ->needs(plot);
-  app.add_option("--scene", o.scene, "Scene from which the cache was made; needed to plot target and ratio")
-      ->type_name("SCENE.xml")
+  app.add_option("--html", o.html,
+                 "Write an interactive page of BRDF caches or of illumination to this file, which needs no other file")
+      ->type_name("OUT.html")
       ->default_str("")
-      ->needs(plot);
+      ->excludes(records)
+      ->excludes(json)
+      ->excludes(plot)
+      ->excludes("--diff");
+  app.add_option("--scene", o.scene,
+                 "Scene from which the caches were made; needed to show target and ratio with --plot or --html")
+      ->type_name("SCENE.xml")
+      ->default_str("");
   app.add_option("--points", o.points, "Write the records of one .illum file as a point cloud")
       ->type_name("OUT.ply")
       ->default_str("")
       ->excludes(records)
       ->excludes(json)
       ->excludes(plot)
+      ->excludes("--html")
       ->excludes("--diff");
   addDefinitions(app, o.read.definitions);
   app.footer(kFooter);
@@ -86,8 +97,13 @@ void validate(const Options& o) {
     if (std::filesystem::path(o.points).extension() != ".ply")
       throw UsageError(fmt::format("--points {}: must be a .ply file", o.points));
   }
-  for (const std::string& output : {o.points, o.plot})
-    if (!output.empty()) checkNotRead(output, {o.files.front(), o.scene});
+  if (!o.scene.empty() && o.plot.empty() && o.html.empty()) throw UsageError("--scene needs --plot or --html");
+  std::vector<std::filesystem::path> inputs(o.files.begin(), o.files.end());
+  inputs.emplace_back(o.scene);
+  for (const std::string& output : {o.points, o.plot, o.html})
+    if (!output.empty()) checkNotRead(output, inputs);
+  if (!o.html.empty() && std::filesystem::path(o.html).extension() != ".html")
+    throw UsageError(fmt::format("--html {}: must be an .html file", o.html));
   if (o.plot.empty()) return;
   if (o.files.size() != 1) throw UsageError("--plot needs exactly one cache file");
   if (std::filesystem::path(o.plot).extension() != ".png")
@@ -127,24 +143,33 @@ bool runDiff(const LobeCache& a, const LobeCache& b, const Options& o) {
 
 // ---- Plots
 
-LobePtr findLobe(const LobeCache& cache, Options& o) {
+/// The lobes of the scene of --scene; none if it is not given. output: must be none of the files that are read.
+std::vector<LobeUse> lobesOfScene(Options& o, const std::string& output) {
+  if (o.scene.empty()) return {};
   o.read.geometry = false;
   // Parts of the scene that the reader does not support cannot contain the lobe.
   o.read.lenient = true;
   const Scene scene = readScene(o.scene, o.read);
-  checkNotRead(o.plot, scene.files);
-  const std::vector<LobeUse> uses = collectLobes(scene);
+  checkNotRead(output, scene.files);
+  return collectLobes(scene);
+}
+
+/// The lobe of a cache; null, if none of the lobes is.
+LobePtr lobeOf(const LobeCache& cache, const std::vector<LobeUse>& uses, const std::string& file) {
   const auto found = std::ranges::find_if(uses, [&](const LobeUse& u) { return u.lobe->key() == cache.info().key; });
-  if (found == uses.end())
-    throw std::runtime_error(
-        fmt::format("{}: no material has the lobe of {} ({}, key {}); plot without --scene, or give the scene and the "
-                    "-D options from which the cache was made",
-                    o.scene, o.files[0], cache.info().summary, cache.info().key));
+  if (found == uses.end()) return nullptr;
   if (found->lobe->revision() != cache.info().modelRevision)
-    printWarning("lobedump",
-                 fmt::format("{}: the code of the model has changed since the fit; the target shows the current model",
-                             o.files[0]));
+    printWarning(
+        "lobedump",
+        fmt::format("{}: the code of the model has changed since the fit; the target shows the current model", file));
   return found->lobe;
+}
+
+std::string noLobe(const LobeCache& cache, const std::string& file, const Options& o) {
+  return fmt::format(
+      "{}: no material has the lobe of {} ({}, key {}); omit --scene, or give the scene and the -D options from "
+      "which the cache was made",
+      o.scene, file, cache.info().summary, cache.info().key);
 }
 
 std::vector<int> chosenRecords(const LobeCache& cache, const Options& o) {
@@ -184,10 +209,25 @@ void printLegend(const LobeCache& cache, const Plot& plot, const Options& o) {
 
 void runPlot(const LobeCache& cache, Options& o) {
   const std::vector<int> records = chosenRecords(cache, o);
-  const LobePtr lobe = o.scene.empty() ? nullptr : findLobe(cache, o);
+  const LobePtr lobe = lobeOf(cache, lobesOfScene(o, o.plot), o.files[0]);
+  if (!lobe && !o.scene.empty()) throw std::runtime_error(noLobe(cache, o.files[0], o));
   const Plot plot = plotRecords(cache, records, lobe.get());
   plot.raster.write(o.plot);
   printLegend(cache, plot, o);
+}
+
+// ---- Page
+
+void runPage(const std::vector<LobeCache>& caches, Options& o) {
+  const std::vector<LobeUse> uses = lobesOfScene(o, o.html);
+  std::vector<LobePtr> lobes;
+  std::vector<PagedCache> paged;
+  for (std::size_t i = 0; i < caches.size(); ++i) {
+    lobes.push_back(lobeOf(caches[i], uses, o.files[i]));
+    if (!lobes.back() && !o.scene.empty()) throw std::runtime_error(noLobe(caches[i], o.files[i], o));
+    paged.push_back({&caches[i], o.files[i], lobes.back().get()});
+  }
+  writeAtomically(o.html, lobePage(paged));
 }
 
 // ---- Illumination
@@ -197,7 +237,8 @@ bool isIllumination(const std::string& file) {
 }
 
 void validateForIllumination(const Options& o) {
-  if (o.diff || !o.plot.empty()) throw UsageError("--diff and --plot work on BRDF caches (.lobe) only");
+  if (o.diff || !o.plot.empty() || !o.scene.empty())
+    throw UsageError("--diff, --plot and --scene work on BRDF caches (.lobe) only");
   if (!std::ranges::all_of(o.files, isIllumination))
     throw UsageError("BRDF caches (.lobe) and illumination (.illum) need separate runs");
 }
@@ -207,6 +248,7 @@ void runIllumination(const Options& o) {
   std::vector<IlluminationFile> files;
   for (const std::string& file : o.files) files.push_back(IlluminationFile::open(file));
   if (!o.points.empty()) return writePoints(files[0], o.points);
+  if (!o.html.empty()) return writeAtomically(o.html, illuminationPage(files, o.files));
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (std::size_t i = 0; i < files.size(); ++i) {
     if (o.json) {
@@ -233,6 +275,8 @@ bool run(Options& o) {
   if (o.diff) return runDiff(caches[0], caches[1], o);
   if (!o.plot.empty())
     runPlot(caches[0], o);
+  else if (!o.html.empty())
+    runPage(caches, o);
   else
     o.json ? printJson(caches, o) : printText(caches, o);
   return true;

@@ -207,7 +207,7 @@ TEST_CASE("fitter: lobedump --plot reports invalid arguments") {
                                                        {"lobedump --plot x.png good.lobe --record 8", "from 0 to 7"},
                                                        {"lobedump --plot x.png good.lobe --record -1", "--record"},
                                                        {"lobedump --plot x.png good.lobe --json", "excludes"},
-                                                       {"lobedump --scene scene.xml good.lobe", "--plot"},
+                                                       {"lobedump --scene scene.xml good.lobe", "--plot or --html"},
                                                        {"lobedump --record 2 good.lobe", "--plot"}};
   for (const auto& [arguments, words] : cases) {
     const ToolRun r = folder.run(arguments);
@@ -218,6 +218,40 @@ TEST_CASE("fitter: lobedump --plot reports invalid arguments") {
   }
   CHECK(folder.run("lobedump --plot none/x.png good.lobe").code == 1);
   CHECK(folder.files() == 5);  // no file was written
+}
+
+TEST_CASE("fitter: lobedump --html writes a page that needs nothing else") {
+  const Caches folder;
+  const ToolRun r = folder.run("lobedump --html page.html --scene scene.xml good.lobe other.lobe");
+  CHECK((r.code == 0 && r.out.empty() && r.error.empty()));
+  const std::string page = readFile(folder / "page.html");
+  CHECK_THAT(page, Catch::StartsWith("<!DOCTYPE html>") && Catch::EndsWith("</html>\n"));
+  CHECK_THAT(page, Catch::Contains("good.lobe") && Catch::Contains("other.lobe") && !Catch::Contains("/* DATA */"));
+  CHECK_THAT(page, !Catch::Contains("://") && !Catch::Contains(" src="));
+  CHECK(folder.run("lobedump --html again.html --scene scene.xml good.lobe other.lobe").code == 0);
+  CHECK(readFile(folder / "again.html") == page);
+  // Without a scene there are no targets.
+  CHECK(folder.run("lobedump --html fits.html good.lobe other.lobe").code == 0);
+  CHECK(readFile(folder / "fits.html").size() < page.size() / 2);
+}
+
+TEST_CASE("fitter: lobedump --html reports invalid arguments") {
+  const Caches folder;
+  const std::pair<const char*, const char*> cases[] = {{"lobedump --html x.htm good.lobe", "must be an .html file"},
+                                                       {"lobedump --html x.html good.lobe --json", "excludes"},
+                                                       {"lobedump --html x.html good.lobe --plot x.png", "excludes"},
+                                                       {"lobedump --html good.lobe good.lobe", "good.lobe"}};
+  for (const auto& [arguments, words] : cases) {
+    const ToolRun r = folder.run(arguments);
+    CAPTURE(arguments);
+    CHECK(r.code == 2);
+    CHECK_THAT(r.error, Catch::Contains(words));
+  }
+  const ToolRun other = folder.run("lobedump --html x.html --scene scene.xml -D alpha=0.25 good.lobe");
+  CHECK(other.code == 1);
+  CHECK_THAT(other.error, Catch::Contains("scene.xml: no material has the lobe of good.lobe"));
+  CHECK(folder.run("lobedump --html none/x.html good.lobe").code == 1);
+  CHECK(folder.files() == 5);
 }
 
 TEST_CASE("fitter: lobedump --diff lists differences and returns exit codes like cmp") {

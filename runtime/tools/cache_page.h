@@ -1,0 +1,30 @@
+#pragma once
+// An interactive HTML page of BRDF caches or of trained illumination. It needs no other file and no network.
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "materials/lobe.h"
+#include "schema/illumination_file.h"
+#include "schema/lobe_cache.h"
+
+namespace lobe {
+
+/// A cache on the page. lobe: the one that it was fitted to, for target and ratio; may be null.
+struct PagedCache {
+  const LobeCache* cache;
+  std::filesystem::path path;
+  const Lobe* lobe;
+};
+
+/// The page shows the record that serves a chosen outgoing direction: target, fit and their ratio over the disc of
+/// incident directions, the components, and the grades. Targets are stored for every record as a grid of cells, which
+/// is coarser for caches of many records, so that the page has at most about 8 MB for each cache.
+std::string lobePage(std::span<const PagedCache> caches);
+
+/// The page shows a map of the records in the scene, and the mixture of the selected one. paths: of the files.
+std::string illuminationPage(std::span<const IlluminationFile> files, std::span<const std::string> paths);
+
+}  // namespace lobe
