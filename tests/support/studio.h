@@ -64,6 +64,7 @@ class Studio {
   const RayCamera& camera() const { return *camera_; }
   const RenderScene& renderScene() const { return *renderScene_; }
   const Scene& scene() const { return scene_; }
+  const GuidedSampler& guidedSampler() const { return *guided_; }
   const GuidedSampler& productSampler() const { return *product_; }
   const GuidedSampler& guidedSampler() const { return *guided_; }
   const GuidedSampler& importanceSampler() const { return *importanceSampler_; }
