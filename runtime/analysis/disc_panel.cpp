@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
 #include <Eigen/Dense>
 
 namespace lobe {
@@ -22,6 +23,10 @@ Vec2 pixelInView(const Panel& panel, const Vec2& y) {
   const Vec2 d = (y - panel.view.centre) / panel.step();
   const float middle = 0.5f * kPanel, limit = d.cwiseAbs().maxCoeff() > middle ? middle - kRing - 3 : middle;
   return {middle + std::clamp(d.x(), -limit, limit), middle - std::clamp(d.y(), -limit, limit)};
+}
+
+std::vector<std::string> linesOf(int width, std::string_view text) {
+  return wrapped(text, static_cast<std::size_t>((width - 2 * kPanelGap) / kTextAdvance));
 }
 
 /// The distance from the ellipse is approximated to first order: Mahalanobis distance over the length of its gradient.
@@ -78,6 +83,34 @@ void drawEllipses(Raster& raster, const Panel& panel, std::span<const Gaussian> 
   if (mixture.empty()) return;
   const float heaviest = std::ranges::max(mixture, {}, &Gaussian::weight).weight;
   for (const Gaussian& g : mixture) drawEllipse(raster, panel, g, 0.3 + 0.7 * std::sqrt(g.weight / heaviest));
+}
+
+void drawScale(Raster& raster, int left, int top, const std::function<Colour(double)>& colourOf,
+               const std::array<std::string, 3>& labels) {
+  constexpr int kBar = 8;
+  for (int x = 0; x < kPanel; ++x)
+    for (int y = 0; y < kBar; ++y) raster.set(left + x, top + y, colourOf((x + 0.5) / kPanel));
+  for (int i = 0; i < 3; ++i) {
+    const int width = kTextAdvance * static_cast<int>(labels[i].size());
+    drawText(raster, left + i * (kPanel - width) / 2, top + kBar + 4, labels[i], kInk);
+  }
+}
+
+std::array<std::string, 3> scaleLabels(double peak, double decades) {
+  const auto label = [&](double below) { return fmt::format("{:.4g}", peak * std::pow(10, -below)); };
+  return {label(decades), label(decades / 2), label(0)};
+}
+
+int drawLines(Raster& raster, int top, std::string_view text) {
+  for (const std::string& line : linesOf(raster.width(), text)) {
+    drawText(raster, kPanelGap, top, line, kInk);
+    top += kLine;
+  }
+  return top;
+}
+
+int countLines(int width, std::string_view text) {
+  return static_cast<int>(linesOf(width, text).size());
 }
 
 void drawRing(Raster& raster, const Panel& panel, const Vec2& where) {

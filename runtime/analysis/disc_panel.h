@@ -2,16 +2,23 @@
 // Draws densities over the disc of directions as square panels of an image: colour maps, ellipses of Gaussians, and
 // rings that mark points. x points to the right and y up; the edge of the disc is the horizon.
 
+#include <array>
 #include <functional>
 #include <span>
+#include <string>
+#include <string_view>
 
 #include "runtime/analysis/raster.h"
+#include "runtime/analysis/text.h"
 #include "runtime/mixture/gaussian.h"
 
 namespace lobe {
 
 inline constexpr int kPanel = 240, kPanelGap = 8;  ///< pixels
 inline constexpr Colour kPaper{1, 1, 1}, kInk{0, 0, 0};
+
+inline constexpr int kLine = kTextHeight + 4;    ///< pixels from a line of text to the next
+inline constexpr int kScaleHeight = 12 + kLine;  ///< pixels of a colour scale with its labels
 
 /// A square section of the plane of the disc.
 struct PlotView {
@@ -46,6 +53,18 @@ void drawDensity(Raster& raster, const Panel& panel, const DiscFunction& density
 
 /// Draws the one-standard-deviation ellipse of each Gaussian; opacity increases with weight.
 void drawEllipses(Raster& raster, const Panel& panel, std::span<const Gaussian> mixture);
+
+/// Draws a bar of colours, as wide as a panel, for t from 0 to 1, with labels at its ends and its middle.
+void drawScale(Raster& raster, int left, int top, const std::function<Colour(double)>& colourOf,
+               const std::array<std::string, 3>& labels);
+
+/// The labels of a logarithmic scale from `decades` below the peak up to the peak.
+std::array<std::string, 3> scaleLabels(double peak, double decades);
+
+/// Draws the text in lines that fit between the margins of the raster, and returns the position after the last one.
+int drawLines(Raster& raster, int top, std::string_view text);
+/// The number of lines that drawLines needs in a raster of this width.
+int countLines(int width, std::string_view text);
 
 /// Draws a ring around a point, or at the border of the panel if the point is out of view.
 void drawRing(Raster& raster, const Panel& panel, const Vec2& where);

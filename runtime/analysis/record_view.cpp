@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include "runtime/analysis/disc_panel.h"
-#include "runtime/analysis/text.h"
 #include "runtime/guiding/field_data.h"
 #include "runtime/guiding/sample_storage_data.h"
 #include "runtime/render/integrators/guided_integrator.h"
@@ -16,8 +15,6 @@ namespace lobe {
 namespace {
 
 constexpr int kCells = 30;  // along each axis of the square around the disc
-constexpr int kTextGap = 4;
-constexpr int kLine = kTextHeight + kTextGap;
 constexpr int kColumns = 3;
 
 /// A histogram of weights over the disc, normalised to a density.
@@ -64,7 +61,7 @@ IncidentRadiance lightAt(const RenderScene& scene, const Field& field, const Rec
 }
 
 std::string numbers(const Vec3& v) {
-  return fmt::format("{:.4g} {:.4g} {:.4g}", v.x(), v.y(), v.z());
+  return fmt::format("{:.4g} {:.4g} {:.4g}", v.x() + 0.0f, v.y() + 0.0f, v.z() + 0.0f);  // no -0
 }
 
 std::string nevOf(const IncidentRadiance& light, const std::function<double(const Vec3&)>& pdf) {
@@ -79,8 +76,8 @@ double degreesBetween(const Vec3& a, const Vec3& b) {
 std::string captionOf(const Receiver& receiver, const ServedDensity& density, const IlluminationRecord& record,
                       const IncidentRadiance& light) {
   return fmt::format(
-      "position {}  normal {}  radius {:.3g}  distance {:.3g}, angle {:.0f}\n"
-      "samples {:.0f}  gaussians {}  background {:.2f}  NEV {}  with half cosine {}",
+      "position {}  normal {}  radius {:.3g}  distance {:.3g}, angle {:.0f}  samples {:.0f}  gaussians {}  background "
+      "{:.2f}  NEV {}  with half cosine {}",
       numbers(record.position), numbers(record.normal), record.radius,
       (receiver.point.position - record.position).norm(), degreesBetween(receiver.normal, record.normal),
       record.samples, record.count, record.background,
@@ -88,8 +85,15 @@ std::string captionOf(const Receiver& receiver, const ServedDensity& density, co
       nevOf(light, [&](const Vec3& wi) { return density.defensive(wi); }));
 }
 
-Raster paper() {
-  return {kPanelGap + kColumns * (kPanel + kPanelGap), kPanelGap + kLine + kPanel + kPanelGap + 2 * kLine + kTextGap,
+constexpr int kWidth = kPanelGap + kColumns * (kPanel + kPanelGap);
+const char* const kLegend =
+    "All panels: density over the disc of directions on one logarithmic scale  x: tangent, to the right  y: up  "
+    "centre: "
+    "normal  edge: horizon  red ellipses: one standard deviation of the Gaussians";
+
+Raster paper(const std::string& caption) {
+  const int lines = countLines(kWidth, caption) + countLines(kWidth, kLegend);
+  return {kWidth, kPanelGap + kLine + kPanel + kPanelGap + kScaleHeight + kPanelGap + lines * kLine + kPanelGap,
           kPaper};
 }
 
@@ -109,14 +113,14 @@ void drawPanels(Raster& raster, const std::array<Field, kColumns>& fields) {
   for (int i = 0; i < kColumns; ++i) {
     drawText(raster, panelAt(i).left, kPanelGap, fields[i].title, kInk);
     drawDensity(raster, panelAt(i), fields[i].density, peak, kRecordDecades);
+    drawScale(raster, panelAt(i).left, panelAt(i).top + kPanel + kPanelGap, sequentialColour,
+              scaleLabels(peak, kRecordDecades));
   }
 }
 
 void drawCaption(Raster& raster, const std::string& caption) {
-  const int top = kPanelGap + kLine + kPanel + kPanelGap;
-  const std::size_t end = caption.find('\n');
-  drawText(raster, kPanelGap, top, caption.substr(0, end), kInk);
-  drawText(raster, kPanelGap, top + kLine, caption.substr(end + 1), kInk);
+  const int top = kPanelGap + kLine + kPanel + kPanelGap + kScaleHeight + kPanelGap;
+  drawLines(raster, drawLines(raster, top, caption), kLegend);
 }
 
 }  // namespace
@@ -143,7 +147,8 @@ RecordView viewRecord(const RenderScene& scene, const Receiver& receiver, const 
   for (const IncidentRadiance::Sample& s : light.samples())
     truth.add(toDisc(density.frame().toLocal(s.wi)), 0.5 * (s.first + s.second) / s.density);
 
-  RecordView view{paper(), captionOf(receiver, density, record, light)};
+  const std::string caption = captionOf(receiver, density, record, light);
+  RecordView view{paper(caption), caption};
   drawPanels(view.raster,
              {{{"mixture", [&](const Vec2& y) { return 2.0 * density.mixture(density.frame().toWorld(fromDisc(y))); }},
                {around.points.empty() ? "particles: not kept" : fmt::format("particles: {}", around.points.size()),

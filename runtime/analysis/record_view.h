@@ -7,9 +7,10 @@
 // record; and, in the same cells, the reference f of incident_radiance.h (path-traced incident radiance × cosθ without
 // the part that next-event estimation finds) at the selected surface point. z is the normal and x the record's tangent.
 // Mixture and particles are shown in the frame of the record, the reference in that of the selected point, where the
-// renderer evaluates the mixture. The text below gives the position and normal of the record, the distance of the
-// selected point and the angle between the normals in degrees, the number of samples that the record has learnt from,
-// and the relative variance (NEV) of the mixture alone and of the mean of mixture and cosine density.
+// renderer evaluates the mixture. Below are the scale, a legend, and a text that gives the position and normal of the
+// record, the distance of the selected point and the angle between the normals in degrees, the number of samples that
+// the record has learnt from, and the relative variance (NEV) of the mixture alone and of the mean of mixture and
+// cosine density.
 
 #include <stdexcept>
 #include <string>
@@ -31,7 +32,7 @@ class NoRecord : public std::runtime_error {
 
 struct RecordView {
   Raster raster;
-  std::string caption;  ///< the text below the panels
+  std::string caption;  ///< the text below the panels; phrases are separated by double spaces
 };
 
 /// The surface point at the centre of a pixel, see firstReceiver. Throws NoRecord if the pixel is outside the image or

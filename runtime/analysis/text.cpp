@@ -1,7 +1,9 @@
 #include "runtime/analysis/text.h"
 
+#include <array>
 #include <cctype>
 #include <cstdint>
+#include <utility>
 
 namespace lobe {
 namespace {
@@ -61,6 +63,56 @@ void drawText(Raster& raster, int x, int y, std::string_view text, const Colour&
           drawSquare(raster, x + kScale * column, y + kScale * row, colour);
     x += kTextAdvance;
   }
+}
+
+namespace {
+
+std::vector<std::string> split(std::string_view text, std::string_view separator) {
+  std::vector<std::string> parts;
+  for (std::size_t end = 0; end != std::string_view::npos;) {
+    end = text.find(separator);
+    if (end != 0 && !text.empty()) parts.emplace_back(text.substr(0, end));
+    if (end != std::string_view::npos) text.remove_prefix(end + separator.size());
+  }
+  return parts;
+}
+
+/// Appends a part to the last line if it fits, otherwise as a new line.
+void place(std::vector<std::string>& lines, const std::string& part, const char* separator, std::size_t columns) {
+  const std::string joined = lines.empty() ? part : lines.back() + separator + part;
+  if (!lines.empty() && joined.size() <= columns)
+    lines.back() = joined;
+  else
+    lines.push_back(part);
+}
+
+}  // namespace
+
+std::vector<std::string> wrapped(std::string_view text, std::size_t columns) {
+  std::vector<std::string> lines;
+  for (const std::string& phrase : split(text, "  ")) {
+    if (phrase.size() <= columns) {
+      place(lines, phrase, "  ", columns);
+      continue;
+    }
+    const char* separator = "  ";
+    for (const std::string& word : split(phrase, " ")) {
+      for (std::size_t at = 0; at < word.size(); at += columns)
+        place(lines, word.substr(at, columns), separator, columns);
+      separator = " ";
+    }
+  }
+  return lines;
+}
+
+std::string spelledOut(std::string_view text) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 3> kNames{
+      {{"α", "alpha"}, {"η", "eta"}, {"×", "x"}}};
+  std::string result(text);
+  for (const auto& [letter, name] : kNames)
+    for (std::size_t at = 0; (at = result.find(letter, at)) != std::string::npos;)
+      result.replace(at, letter.size(), name);
+  return result;
 }
 
 }  // namespace lobe

@@ -22,6 +22,7 @@ inline constexpr double kPlotRatio = 10;
 
 struct PlotRow {
   int record;
+  int top;                       ///< of its panels, in pixels
   PlotView view;                 ///< the whole disc, or an enlarged view of a small lobe
   double peak;                   ///< upper end of the scale of target and fit
   std::optional<Quality> grade;  ///< only if the lobe is available
@@ -34,7 +35,8 @@ struct Plot {
 
 /// Draws target, fit and ratio of the records, or only the fit if lobe is null. All records must have components, and
 /// lobe must be the one that the cache was fitted to. The fit shows the one-standard-deviation ellipses of all
-/// components. A ring marks the point of the worst f/p in all panels, at their border if the point is out of view.
+/// components. Titles, the direction and the grades of each record, colour scales and a legend are around the panels. A
+/// ring marks the point of the worst f/p in all panels, at their border if the point is out of view.
 Plot plotRecords(const LobeCache& cache, std::span<const int> records, const Lobe* lobe);
 
 /// Indices of up to `rows` of `count` records, evenly spaced from the first to the last.

@@ -84,9 +84,7 @@ void drawRecord(const RenderJob& job, const RenderScene& scene, const Receiver& 
   try {
     const RecordView view = viewRecord(scene, receiver, training, job.training.records);
     view.raster.write(job.recordImage);
-    std::string line = view.caption;
-    std::ranges::replace(line, '\n', ' ');
-    printNote(kTool, fmt::format("{}: {}", job.recordImage.string(), line));
+    printNote(kTool, fmt::format("{}: {}", job.recordImage.string(), view.caption));
   } catch (const NoRecord& e) {
     printWarning(kTool, recordFault(job, e));
   }
