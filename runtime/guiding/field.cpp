@@ -46,9 +46,9 @@ void FieldOptions::validate() const {
 
 Field::Field() : data_(std::make_shared<FieldData>()) {}
 
-Field::Field(const FieldOptions& options) : data_(std::make_shared<FieldData>()) {
+Field::Field(const FieldOptions& options, const Field& earlier) : data_(std::make_shared<FieldData>()) {
   options.validate();
-  data_->trainer.emplace(trainingOptions(options), options.sceneDiagonal);
+  data_->trainer.emplace(trainingOptions(options), options.sceneDiagonal, earlier.cache().records());
 }
 
 Field::Field(std::shared_ptr<FieldData> data) : data_(std::move(data)) {}

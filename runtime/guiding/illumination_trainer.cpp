@@ -7,6 +7,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "runtime/core/parallel.h"
 #include "runtime/guiding/request_cubes.h"
@@ -43,9 +44,11 @@ void TrainingOptions::validate() const {
   require(klThreshold > 0, "klThreshold", "positive");
 }
 
-IlluminationTrainer::IlluminationTrainer(const TrainingOptions& options, float sceneDiagonal)
-    : options_(options), unit_(options.unitFraction * sceneDiagonal) {
+IlluminationTrainer::IlluminationTrainer(const TrainingOptions& options, float sceneDiagonal,
+                                         std::vector<IlluminationRecord> kept)
+    : options_(options), unit_(options.unitFraction * sceneDiagonal), kept_(std::move(kept)) {
   options.validate();
+  if (!kept_.empty()) rebuildCache();
 }
 
 std::optional<double> IlluminationTrainer::learn(std::span<const std::span<const Particle>> sources,
@@ -65,8 +68,10 @@ void IlluminationTrainer::fill(std::span<const std::span<const Particle>> source
 
 void IlluminationTrainer::learnFractions(std::span<const FractionSample> samples) {
   std::vector<std::vector<FractionSample>> ofRecord(records_.size());
-  for (const FractionSample& s : samples)
-    if (s.record < records_.size()) ofRecord[s.record].push_back(s);  // other samples belong to another field
+  for (const FractionSample& s : samples) {
+    const std::size_t index = s.record - kept_.size();  // huge for records that are kept
+    if (s.record >= kept_.size() && index < records_.size()) ofRecord[index].push_back(s);  // others: another field's
+  }
   parallelFor(std::size_t{0}, records_.size(), [&](std::size_t i) { records_[i].fraction.learn(ofRecord[i]); });
 }
 
@@ -173,10 +178,11 @@ void IlluminationTrainer::shrinkRadius(Training& record) const {
 }
 
 void IlluminationTrainer::rebuildCache() {
-  std::vector<IlluminationRecord> records(records_.size());
+  std::vector<IlluminationRecord> records = kept_;
+  records.resize(kept_.size() + records_.size());
   parallelFor(std::size_t{0}, records_.size(), [&](std::size_t i) {
     const Training& t = records_[i];
-    IlluminationRecord& r = records[i];
+    IlluminationRecord& r = records[kept_.size() + i];
     r.position = t.position;
     r.normal = t.normal;
     r.tangent = t.tangent;
@@ -192,10 +198,13 @@ void IlluminationTrainer::rebuildCache() {
 }
 
 double IlluminationTrainer::undersampledFraction() const {
-  if (records_.empty()) return 0;
-  const int limit = kUndersampledPerComponent * options_.components;
-  const auto few = std::ranges::count_if(records_, [&](const Training& t) { return t.em.samplesSeen() < limit; });
-  return static_cast<double>(few) / static_cast<double>(records_.size());
+  const std::size_t all = kept_.size() + records_.size();
+  if (all == 0) return 0;
+  const auto limit = static_cast<float>(kUndersampledPerComponent * options_.components);
+  const auto few = std::ranges::count_if(
+                       records_, [&](const Training& t) { return static_cast<float>(t.em.samplesSeen()) < limit; }) +
+                   std::ranges::count_if(kept_, [&](const IlluminationRecord& r) { return r.samples < limit; });
+  return static_cast<double>(few) / static_cast<double>(all);
 }
 
 }  // namespace lobe

@@ -27,8 +27,9 @@ struct TrainingOptions {
 
 class IlluminationTrainer {
  public:
-  /// sceneDiagonal: diagonal of the scene's bounding box in world units, > 0.
-  IlluminationTrainer(const TrainingOptions& options, float sceneDiagonal);
+  /// sceneDiagonal: diagonal of the scene's bounding box in world units, > 0. kept: records of an earlier training,
+  /// which stay as they are; their indices in cache() come first.
+  IlluminationTrainer(const TrainingOptions& options, float sceneDiagonal, std::vector<IlluminationRecord> kept = {});
 
   /// Performs one pass: updates every record from the particles near it, then creates a record for each request that no
   /// record serves and that has particles near it. Sources: as for ParticleNeighbours; they may be empty. Returns the
@@ -74,6 +75,7 @@ class IlluminationTrainer {
 
   TrainingOptions options_;
   float unit_;
+  std::vector<IlluminationRecord> kept_;
   std::vector<Training> records_;
   IlluminationCache cache_;
 };

@@ -77,7 +77,7 @@ struct Options {
   std::vector<const CLI::Option*> training, merging;
 };
 
-/// Declares the training options, all of which exclude --illumination.
+/// Declares the training options.
 void declareTraining(CLI::App& app, Options& options) {
   RenderJob& job = options.job;
   app.option_defaults()->group("Training");
@@ -102,19 +102,14 @@ void declareTraining(CLI::App& app, Options& options) {
       ->default_str("learnt");
   app.add_option("--train-seconds", job.trainSeconds,
                  "Approximate time limit for training in seconds (default: 15 % of --seconds, or no limit with --spp)");
-  const auto ofTraining = [&app] {
-    return app.get_options([](const CLI::Option* o) { return o->get_group() == "Training"; });
-  };
-  for (const CLI::Option* option : ofTraining()) options.training.push_back(option);
+  for (const CLI::Option* option : app.get_options([](const CLI::Option* o) { return o->get_group() == "Training"; }))
+    options.training.push_back(option);
   app.add_option("--save-illumination", job.saveIllumination, "Save the trained illumination to this file")
       ->type_name("OUT.illum");
-  auto* stored =
-      app.add_option(
-             "--illumination", job.illumination,
-             "Load illumination saved by an earlier run for the same scene (with any camera) instead of training")
-          ->type_name("FILE.illum");
-  for (CLI::Option* option : ofTraining())
-    if (option != stored) stored->excludes(option);
+  app.add_option("--illumination", job.illumination,
+                 "Load illumination saved by an earlier run for the same scene (with any camera) instead of training; "
+                 "with --passes or --train-seconds, go on with the training, which adds records where there are none")
+      ->type_name("FILE.illum");
   app.option_defaults()->group("Options");
 }
 
@@ -140,6 +135,9 @@ void declareBidirectional(CLI::App& app, Options& options) {
 void declare(CLI::App& app, Options& options) {
   RenderJob& job = options.job;
   app.add_option("scene", job.scene, "Mitsuba scene file")->required()->type_name("SCENE.xml");
+  app.add_option("--camera", job.camera,
+                 "Take the sensor, with its film, from this scene file instead of the scene's own")
+      ->type_name("FILE.xml");
   app.add_option("-o,--output", job.outputs, "Output picture, .exr or .png (repeatable)")
       ->type_name("FILE")
       ->default_str("")
@@ -259,9 +257,22 @@ void noteUnused(const Options& options) {
     printNote("loberender", fmt::format("--integrator {} ignores {}", nameOf(job.integrator), fmt::join(unused, ", ")));
 }
 
+/// Stored illumination that is not trained further leaves no use for the options of training.
+void checkTraining(const Options& options) {
+  if (options.job.illumination.empty() || options.job.trainsFurther()) return;
+  for (const CLI::Option* option : options.training)
+    if (option->count() > 0)
+      throw UsageError(
+          fmt::format("{} has no effect with --illumination, except with --passes or --train-seconds, which "
+                      "continue the training",
+                      option->get_name()));
+}
+
 void work(Options& options) {
+  const RenderJob& job = options.job;
   if (options.check)
-    return reportCheck(options.job.scene, {options.job.definitions, options.job.lenient}, options.json, stdout);
+    return reportCheck(job.scene, {job.definitions, job.lenient, true, {}, job.camera}, options.json, stdout);
+  checkTraining(options);
   if (!options.size.empty()) options.job.size = parsePair("--size", options.size, 'x', "WIDTHxHEIGHT");
   options.job.aovs = parseAovs(options.aovs);
   if (!options.record.empty()) options.job.record = parsePair("--record", options.record, ',', "X,Y");

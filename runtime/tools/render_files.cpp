@@ -30,7 +30,7 @@ std::vector<std::filesystem::path> writtenBy(const RenderJob& job) {
 void checkFiles(const RenderJob& job) {
   const std::vector<std::filesystem::path> written = writtenBy(job);
   std::map<std::filesystem::path, int> uses;
-  for (const auto& path : {job.scene, job.reference, job.illumination})
+  for (const auto& path : {job.scene, job.camera, job.reference, job.illumination})
     if (!path.empty()) ++uses[placeOf(path)];
   if (!job.resume.empty() && (job.checkpoint.empty() || placeOf(job.resume) != placeOf(job.checkpoint)))
     ++uses[placeOf(job.resume)];

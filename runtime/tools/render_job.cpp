@@ -10,6 +10,7 @@
 
 #include "runtime/image/image_output.h"
 #include "runtime/tools/tool.h"
+#include "scenes/mitsuba/reader.h"
 
 namespace lobe {
 namespace {
@@ -57,8 +58,9 @@ void RenderJob::validate() const {
           fmt::format("the sum of --sample-offset and --spp must be at most {}", std::numeric_limits<int>::max()));
   require(guided() || (illumination.empty() && saveIllumination.empty()),
           "--illumination and --save-illumination require --integrator auto, guided or product, or bdpt with --guide");
-  require(illumination.empty() || saveIllumination.empty(),
-          "--save-illumination cannot be combined with --illumination, which replaces training");
+  require(illumination.empty() || saveIllumination.empty() || trainsFurther(),
+          "--save-illumination cannot be combined with --illumination, which replaces training, unless --passes or "
+          "--train-seconds continue the training");
   require(!seconds || (*seconds > 0 && std::isfinite(*seconds)), "--seconds must be a finite number greater than 0");
   require(!size || (size->first >= 1 && size->second >= 1 && std::int64_t{size->first} * size->second <= kMaxPixels),
           fmt::format("--size must be at least 1x1 and at most {} pixels", kMaxPixels));
@@ -100,7 +102,8 @@ void RenderJob::validate() const {
 std::string lobefitCommand(const RenderJob& job) {
   std::string command =
       fmt::format("lobefit {} -o {}", shellQuoted(job.scene.string()), shellQuoted(job.cacheFolder.string()));
-  for (const auto& [name, value] : job.definitions)
+  const auto definitions = job.camera.empty() ? job.definitions : definitionsUsedBy(job.scene, job.definitions);
+  for (const auto& [name, value] : definitions)
     command += fmt::format(" -D {}", shellQuoted(fmt::format("{}={}", name, value)));
   if (job.lenient) command += " --lenient";
   return command;

@@ -38,6 +38,7 @@ const char* nameOf(LightPathUse use);
 
 struct RenderJob {
   std::filesystem::path scene;
+  std::filesystem::path camera;  ///< scene file whose sensor replaces that of the scene; empty: not used
   std::map<std::string, std::string> definitions;
   bool lenient = false;
   std::filesystem::path cacheFolder = "lobes";
@@ -65,7 +66,7 @@ struct RenderJob {
   std::optional<int> passes;  ///< training passes; by default those of the plan, or unlimited if the time is limited
   std::optional<double> trainSeconds;  ///< training time; by default a fraction of seconds, or no limit
 
-  /// Files of illumination to load instead of training, and to save after training. Empty: not used.
+  /// Files of illumination to load, instead of training or as its start, and to save after training. Empty: not used.
   std::filesystem::path illumination, saveIllumination;
 
   std::filesystem::path reference, convergence, stats;  ///< empty: not used
@@ -85,6 +86,8 @@ struct RenderJob {
 
   /// Whether illumination is trained, from which the integrator may sample directions.
   bool guided() const;
+  /// Whether stored illumination is trained further.
+  bool trainsFurther() const { return !illumination.empty() && (passes || trainSeconds); }
   /// Whether camera paths may be combined with light paths.
   bool mayUseLightPaths() const { return guided() && integrator != IntegratorKind::bdpt && !gradients; }
   /// Whether directions may be sampled from the product, which needs BRDF caches.

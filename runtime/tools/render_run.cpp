@@ -41,8 +41,8 @@ constexpr const char* kTool = "loberender";
 
 Scene readFor(const RenderJob& job) {
   Progress progress("reading", 1.0);
-  Scene scene =
-      readScene(job.scene, {job.definitions, job.lenient, true, [&](double fraction) { progress.advance(fraction); }});
+  Scene scene = readScene(job.scene, {job.definitions, job.lenient, true,
+                                      [&](double fraction) { progress.advance(fraction); }, job.camera});
   for (const std::string& note : scene.notes) printNote(kTool, note);
   for (const std::string& warning : scene.warnings) printWarning(kTool, warning);
   const bool shines = std::ranges::any_of(scene.shapes, [](const Shape& shape) { return shape.emitter.has_value(); });
@@ -204,7 +204,7 @@ void Run::readCheckpoint() {
 
 void Run::readStored(const IlluminationFile& file) {
   readIllumination(file, job_.illumination);
-  if (job_.integrator == IntegratorKind::bdpt)
+  if (job_.integrator == IntegratorKind::bdpt && !job_.trainsFurther())
     printNote(kTool, fmt::format("{}: holds no importance, so light paths are not guided", job_.illumination.string()));
 }
 
@@ -220,7 +220,7 @@ void Run::readIllumination(const IlluminationFile& file, const std::filesystem::
 
 void Run::makeGuiding() {
   const TrainingPlan plan = planOf(job_);
-  if (!resumed_ && job_.illumination.empty()) train(plan, *renderScene_, *camera_, guiding_);
+  if (!resumed_ && (job_.illumination.empty() || job_.trainsFurther())) train(plan, *renderScene_, *camera_, guiding_);
   if (!job_.checkpoint.empty() || !job_.saveIllumination.empty())
     illumination_ = encodeIllumination(guiding_.training, plan, *scene_, job_.scene);
   if (!job_.checkpoint.empty() && guiding_.training.importance.records() > 0)

@@ -4,6 +4,7 @@
 #include <array>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -148,8 +149,11 @@ TrainingPlan planOf(const RenderJob& job) {
 void train(const TrainingPlan& plan, const RenderScene& scene, const RayCamera& camera, Guiding& guiding) {
   const bool timed = plan.seconds < kInfinity;
   Progress progress("training", timed ? plan.seconds : plan.passes);
-  guiding.training = trainIllumination(scene, camera, guiding.cachesOrNull(), plan,
-                                       [&](const PassReport& pass) { progress.advance(timed ? pass.seconds : 1.0); });
+  const TrainedIllumination earlier = std::move(guiding.training);
+  guiding.training = trainIllumination(
+      scene, camera, guiding.cachesOrNull(), plan,
+      [&](const PassReport& pass) { progress.advance(timed ? pass.seconds : 1.0); }, earlier.field);
+  if (earlier.field.records() > 0 && !earlier.report.learntFractions) guiding.training.report.learntFractions = false;
 }
 
 RunSettings settingsOf(const RenderJob& job, const Scene& scene, const Guiding& guiding,

@@ -76,7 +76,7 @@ using AnyIntegrator =
 /// The plan of training for the options.
 TrainingPlan planOf(const RenderJob& job);
 
-/// Trains the illumination, with a progress line. Sets guiding.training.
+/// Trains the illumination, with a progress line. Sets guiding.training, starting with what it holds.
 void train(const TrainingPlan& plan, const RenderScene& scene, const RayCamera& camera, Guiding& guiding);
 
 /// Everything that determines the samples of a picture, except for their number and time limits of training.

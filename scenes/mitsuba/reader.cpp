@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -25,8 +26,10 @@ constexpr std::array<std::string_view, 7> kElsewhere = {"alias", "default", "fil
 
 class SceneReader {
  public:
-  explicit SceneReader(ReadContext& context)
+  /// cameraFile: where the sensor is read; null: in the scene.
+  SceneReader(ReadContext& context, const SceneFile* cameraFile)
       : context_(context),
+        cameraFile_(cameraFile),
         textures_(context),
         materials_(context, textures_),
         shapes_(context, textures_, materials_),
@@ -37,6 +40,7 @@ class SceneReader {
       throwIfCancelled();
       context_.attempt(fmt::format("{} is left out", nameOf(node)), [&] { readElement(node); });
     }
+    if (context_.options.geometry) readOtherSensor();
     if (!sensor_ && context_.options.geometry)
       context_.unsupported(context_.file.scene(), "no sensor", "the scene has no <sensor>", "");
     emitters_.finish();
@@ -58,7 +62,7 @@ class SceneReader {
     else if (tag == "emitter")
       emitters_.add(node);
     else if (tag == "sensor")
-      readFirstSensor(node);
+      readOwnSensor(node);
     else if (tag == "integrator")
       readFirstIntegrator(node);
     else if (std::ranges::find(kElsewhere, tag) == kElsewhere.end())
@@ -82,11 +86,24 @@ class SceneReader {
     readIntegrator(context_, node);
   }
 
-  void readFirstSensor(pugi::xml_node node) {
-    if (sensor_) return context_.note("only the first of several sensors is used");
+  void readFirstSensor(ReadContext& context, pugi::xml_node node) {
+    if (sensor_) return context.note("only the first of several sensors is used");
     sensor_ = true;
     // Nothing can be rendered without a camera, so lenient reading does not tolerate its faults.
-    context_.attempt("", [&] { readSensor(context_, node); });
+    context.attempt("", [&] { readSensor(context, node); });
+  }
+
+  void readOwnSensor(pugi::xml_node node) {
+    if (!cameraFile_) readFirstSensor(context_, node);
+  }
+
+  void readOtherSensor() {
+    if (!cameraFile_) return;
+    ReadContext context(*cameraFile_, context_.options, context_.scene, context_.findings);
+    for (const pugi::xml_node node : cameraFile_->scene().children())
+      if (elementName(node) == "sensor") readFirstSensor(context, node);
+    if (!sensor_) context.unsupported(cameraFile_->scene(), "no sensor", "the file has no <sensor>", "");
+    sensor_ = true;
   }
 
   void reject(pugi::xml_node node) {
@@ -97,6 +114,7 @@ class SceneReader {
   }
 
   ReadContext& context_;
+  const SceneFile* cameraFile_;
   TextureReader textures_;
   MaterialReader materials_;
   ShapeReader shapes_;
@@ -113,9 +131,13 @@ void checkSomethingIsLeft(const std::filesystem::path& path, const Scene& scene,
 
 Scene read(const std::filesystem::path& path, const ReadOptions& options, Findings& findings) {
   const SceneFile file(path, options.definitions, findings);
+  std::optional<SceneFile> camera;
+  if (!options.camera.empty()) camera.emplace(options.camera, options.definitions, findings);
+  const SceneFile* cameraOrNull = camera ? &*camera : nullptr;
+  file.checkDefinitionsUsed(options.definitions, cameraOrNull);
   Scene scene;
   ReadContext context(file, options, scene, findings);
-  SceneReader(context).read();
+  SceneReader(context, cameraOrNull).read();
   checkSomethingIsLeft(path, scene, options, findings);
   return scene;
 }
@@ -142,6 +164,15 @@ Scene readScene(const std::filesystem::path& path, const ReadOptions& options) {
   scene.notes = findings.notes();
   scene.files = findings.files();
   return scene;
+}
+
+std::map<std::string, std::string> definitionsUsedBy(const std::filesystem::path& path,
+                                                     const std::map<std::string, std::string>& definitions) {
+  Findings findings;
+  const SceneFile file(path, definitions, findings);
+  std::map<std::string, std::string> used = definitions;
+  std::erase_if(used, [&](const auto& definition) { return !file.uses(definition.first); });
+  return used;
 }
 
 SceneCheck checkScene(const std::filesystem::path& path, const ReadOptions& options) {

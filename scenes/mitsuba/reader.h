@@ -21,12 +21,19 @@ struct ReadOptions {
   bool geometry = true;
   /// Called from any thread after each mesh, with the fraction of all meshes that it is (increments that sum to 1).
   std::function<void(double)> onProgress = {};
+  /// Another scene file, whose first sensor with its film is read in place of that of the scene; empty: none. Nothing
+  /// else of it is used. The definitions are for both files, and each must be used by one of them.
+  std::filesystem::path camera = {};
 };
 
 /// Reads the whole file, then throws SceneError with all faults found; with options.lenient, only if nothing is left to
 /// draw or there is no camera. Meshes are read in parallel with oneTBB. Throws LoopCancelled soon after a task in which
 /// this runs has been cancelled.
 Scene readScene(const std::filesystem::path& path, const ReadOptions& options = {});
+
+/// Those of the definitions that the file uses. Throws SceneError if the file cannot be parsed.
+std::map<std::string, std::string> definitionsUsedBy(const std::filesystem::path& path,
+                                                     const std::map<std::string, std::string>& definitions);
 
 /// What readScene finds in a file.
 struct SceneCheck {

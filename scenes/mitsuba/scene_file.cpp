@@ -118,7 +118,6 @@ SceneFile::SceneFile(const std::filesystem::path& path, const std::map<std::stri
     readFolders();
   } while (expandInclude());
   substitute(scene_);
-  checkDefinitionsUsed(definitions);
   indexIds(scene_);
   indexAliases();
 }
@@ -282,9 +281,10 @@ std::string SceneFile::substituted(const std::string& text, pugi::xml_node node)
   return result;
 }
 
-void SceneFile::checkDefinitionsUsed(const std::map<std::string, std::string>& definitions) const {
+void SceneFile::checkDefinitionsUsed(const std::map<std::string, std::string>& definitions,
+                                     const SceneFile* other) const {
   for (const auto& [name, value] : definitions)
-    if (!usedNames_.contains(name))
+    if (!uses(name) && !(other && other->uses(name)))
       fail(scene_, fmt::format("-D defines ${}, which the scene does not use; it uses {}", name,
                                usedNames_.empty() ? "none" : fmt::format("{}", fmt::join(usedNames_, ", "))));
 }

@@ -29,12 +29,16 @@ class SceneFile {
   /// Reads and parses the file, replaces every <include> by the content of the <scene> in that file, and replaces every
   /// $name by its definition or, without one, by the first <default> of this name. Adds faults to findings, which must
   /// outlive this object: an undefined $name, a duplicate id, a file that cannot be included. Throws SceneError when
-  /// nothing can be read (no such file, malformed XML, elements nested too deeply), and for a definition that is not
-  /// used.
+  /// nothing can be read (no such file, malformed XML, elements nested too deeply).
   SceneFile(const std::filesystem::path& path, const std::map<std::string, std::string>& definitions,
             Findings& findings);
 
   pugi::xml_node scene() const { return scene_; }
+
+  /// Whether the file has $name, or a <default> for it.
+  bool uses(const std::string& name) const { return usedNames_.contains(name); }
+  /// Throws SceneError for a definition that neither this file nor the other one uses; other may be null.
+  void checkDefinitionsUsed(const std::map<std::string, std::string>& definitions, const SceneFile* other) const;
 
   /// Whether the scene's version says that it is written for Mitsuba 2 or 3, which have some different defaults. A
   /// scene without a version is an older one.
@@ -92,7 +96,6 @@ class SceneFile {
   const Segment& segmentAt(std::size_t offset) const;
   void substitute(pugi::xml_node node);
   std::string substituted(const std::string& text, pugi::xml_node node);
-  void checkDefinitionsUsed(const std::map<std::string, std::string>& definitions) const;
   std::vector<std::string> names() const;  // of all values
   void indexIds(pugi::xml_node node);
   void indexAliases();

@@ -1,8 +1,11 @@
 // The public interface of the guiding library.
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 #include <vector>
 
 #include <catch2/catch.hpp>
@@ -11,6 +14,7 @@
 #include "lobe/path_recorder.h"
 #include "lobe/surface_distribution.h"
 #include "runtime/core/random.h"
+#include "runtime/guiding/field_data.h"
 #include "runtime/guiding/sample_storage_data.h"
 #include "tests/support/tool_run.h"
 
@@ -251,4 +255,65 @@ TEST_CASE("guiding: filling creates the missing records and keeps the others") {
   elsewhere.requestRecord({5, 5, 0}, {0, 0, 1});
   field.fill(elsewhere, particles);
   CHECK(field.records() == 2);
+}
+
+TEST_CASE("guiding: a field with the records of an earlier one keeps them and adds others") {
+  const Field earlier = trained();
+  const std::vector<IlluminationRecord> before = cacheOf(earlier).records();
+  // The same paths, and others on a part of the floor that has no records.
+  SampleStorage storage;
+  for (int i = 0; i < 2000; ++i) {
+    addPath(storage, static_cast<std::uint64_t>(2 * i));
+    Rng rng(6, 0, static_cast<std::uint64_t>(i));
+    const Float3 position{5 + rng.uniform(), rng.uniform(), 0};
+    storage.beginPath(static_cast<std::uint64_t>(2 * i + 1));
+    storage.addPhoton(position, {0, 0, 1}, {0, 0.6f, 0.8f}, 1, 3, 1);
+    storage.requestRecord(position, {0, 0, 1});
+  }
+  Field field(smallField(), earlier);
+  CHECK(field.records() == earlier.records());
+  field.update(storage);
+  field.refit();
+  field.fill(storage, storage);
+  const std::vector<IlluminationRecord> after = cacheOf(field).records();
+  REQUIRE(after.size() > before.size() + 3);
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    CHECK(after[i].position == before[i].position);
+    CHECK(after[i].samples == before[i].samples);
+    CHECK(after[i].radius == before[i].radius);
+    CHECK(after[i].components[0].meanX == before[i].components[0].meanX);
+  }
+  // Few of the others are on the part that had records.
+  const auto added = std::ranges::count_if(after, [](const IlluminationRecord& r) { return r.position.x() < 2; });
+  CHECK(static_cast<std::size_t>(added) < before.size() + before.size() / 5 + 2);
+  CHECK(cacheOf(field).find({5.5f, 0.5f, 0}, {0, 0, 1}) != nullptr);
+  CHECK(cacheOf(earlier).find({5.5f, 0.5f, 0}, {0, 0, 1}) == nullptr);
+  CHECK(earlier.records() == before.size());
+}
+
+TEST_CASE("guiding: BSDF sampling fractions are learnt by the records that are added alone") {
+  const std::vector<IlluminationRecord> kept = cacheOf(trained()).records();
+  std::vector<Particle> particles;
+  std::vector<RecordRequest> requests;
+  for (int i = 0; i < 500; ++i) {
+    Rng rng(6, 0, static_cast<std::uint64_t>(i));
+    const Vec3 position(5 + rng.uniform(), rng.uniform(), 0);
+    particles.push_back(
+        {.position = position, .normal = Vec3::UnitZ(), .direction = Vec3(0, 0.6f, 0.8f), .weight = 1, .distance = 3});
+    requests.push_back({position, Vec3::UnitZ()});
+  }
+  IlluminationTrainer trainer({.unitFraction = 0.1f}, 10, kept);
+  trainer.learn(std::array{std::span<const Particle>(particles)}, requests);
+  const std::size_t all = trainer.cache().size();
+  REQUIRE(all > kept.size());
+  // For each record, samples of directions that only the BSDF finds.
+  std::vector<FractionSample> samples;
+  for (std::size_t i = 0; i < 100 * all; ++i) samples.push_back({i % all, 1, 0.01f, 1, 1});
+  trainer.learnFractions(samples);
+  trainer.fill(std::array{std::span<const Particle>(particles)}, {});  // makes the cache anew
+  const std::vector<IlluminationRecord> after = trainer.cache().records();
+  for (std::size_t i = 0; i < all; ++i) {
+    if (i < kept.size()) CHECK(after[i].bsdfFraction == kept[i].bsdfFraction);
+    if (i >= kept.size()) CHECK(after[i].bsdfFraction > kInitialBsdfFraction);
+  }
 }

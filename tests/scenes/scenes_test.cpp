@@ -423,4 +423,27 @@ TEST_CASE("scenes: reading without geometry reads all materials and no mesh") {
   CHECK(scene.materials[0].name == "A");
 }
 
+TEST_CASE("scenes: the sensor of another file replaces that of the scene") {
+  const TestFolder folder;
+  const std::string scene =
+      "<scene version=\"3.0.0\"><integrator type=\"path\"><integer name=\"max_depth\" value=\"7\"/></integrator>"
+      "<sensor type=\"nonsense\"/><shape type=\"sphere\"/></scene>";
+  const std::string camera =
+      "<scene version=\"3.0.0\"><integrator type=\"path\"><integer name=\"max_depth\" value=\"3\"/></integrator>"
+      "<sensor type=\"perspective\"><float name=\"fov\" value=\"$fov\"/><film type=\"hdrfilm\">"
+      "<integer name=\"width\" value=\"40\"/><integer name=\"height\" value=\"30\"/>"
+      "<integer name=\"crop_width\" value=\"20\"/></film></sensor><shape type=\"cube\"/></scene>";
+  ReadOptions options;
+  options.definitions = {{"fov", "35"}};
+  options.camera = folder.write("camera.xml", camera);
+  const Scene read = readScene(folder.write("scene.xml", scene), options);
+  CHECK(read.camera.fov == 35);
+  CHECK(read.camera.width == 40);
+  CHECK(read.camera.picture().width == 20);
+  CHECK(read.maxDepth == 7);
+  CHECK(read.shapes.size() == 1);
+  options.definitions["speed"] = "1";
+  CHECK_THROWS_WITH(readScene(folder.path() / "scene.xml", options), Catch::Contains("$speed"));
+}
+
 }  // namespace lobe

@@ -96,13 +96,76 @@ TEST_CASE("loberender: errors explain why an illumination file is invalid") {
   CHECK_THAT(fault(folder, use + "none", 1), Catch::Contains("a.illumnone: no such file"));
 }
 
+TEST_CASE("loberender: training goes on from stored illumination, which the new camera extends") {
+  const SceneFolder folder(true);
+  std::string camera = kScene;
+  camera.replace(camera.find("0, 2, 6"), 7, "6, 2, 0");  // from another side
+  folder.write("other.xml", camera);
+  REQUIRE(folder.run(kSave).code == 0);
+  const auto recordsOf = [&](const std::string& stats) {
+    return nlohmann::json::parse(folder.bytes(stats)).at("records").get<int>();
+  };
+  const std::string use = "loberender scene.xml --camera other.xml --spp 2 --illumination a.illum";
+  REQUIRE(folder.run(use + " -o plain.exr --stats plain.json").code == 0);
+  const std::string further = use + kTraining + " --checkpoint run.ckpt --save-illumination b.illum";
+  REQUIRE(folder.run(further + " -o a.exr --stats further.json --threads 1").code == 0);
+  CHECK(recordsOf("further.json") > recordsOf("plain.json"));
+  const std::string picture = folder.bytes("a.exr"), stored = folder.bytes("b.illum");
+  SECTION("the same bytes on other threads, from the stored result, and in a resumed run") {
+    REQUIRE(folder.run(further + " -o a.exr --threads 7").code == 0);
+    CHECK((folder.bytes("a.exr") == picture && folder.bytes("b.illum") == stored));
+    REQUIRE(folder.run("loberender other.xml --spp 2 -o a.exr --illumination b.illum").code == 0);
+    CHECK(folder.bytes("a.exr") == picture);
+    const std::string resumed = use + kTraining + " --resume run.ckpt -o a.exr";
+    REQUIRE(folder.run(resumed).code == 0);
+    CHECK(folder.bytes("a.exr") == picture);
+  }
+  SECTION("with the same camera, few records are missing") {
+    REQUIRE(
+        folder.run("loberender scene.xml --spp 1 -o a.exr --illumination a.illum --stats same.json" + kTraining).code ==
+        0);
+    CHECK(recordsOf("same.json") - recordsOf("plain.json") < recordsOf("further.json") - recordsOf("plain.json"));
+  }
+}
+
+TEST_CASE("loberender: the sensor can come from another file") {
+  const SceneFolder folder(false);
+  const std::string path = " --integrator path --spp 2 ";
+  std::string other = kScene;
+  other.replace(other.find("value=\"16\""), 10, "value=\"20\"");
+  other.replace(other.find("0, 2, 6"), 7, "1, 3, 5");
+  folder.write("other.xml", other);
+  // Only the sensor, with a parameter; the scene has none of this name.
+  const std::size_t begin = other.find("<sensor"), end = other.find("</sensor>") + 9;
+  std::string sensor = other.substr(begin, end - begin);
+  sensor.replace(sensor.find("value=\"50\""), 10, "value=\"$fov\"");
+  folder.write("camera.xml", "<scene version=\"0.6.0\">" + sensor + "</scene>");
+  REQUIRE(folder.run("loberender other.xml -o a.exr" + path).code == 0);
+  const ToolRun run = folder.run("loberender scene.xml --camera camera.xml -D fov=50 -o b.exr" + path);
+  CAPTURE(run.error);
+  REQUIRE(run.code == 0);
+  CHECK(folder.bytes("a.exr") == folder.bytes("b.exr"));
+  SECTION("errors") {
+    const std::string use = "loberender scene.xml -o c.exr --integrator path --spp 1 --camera ";
+    folder.write("empty.xml", "<scene version=\"0.6.0\"><bsdf type=\"diffuse\"/></scene>");
+    CHECK_THAT(fault(folder, use + "empty.xml", 1), Catch::Contains("empty.xml:1:1: the file has no <sensor>"));
+    CHECK_THAT(fault(folder, use + "gone.xml", 1), Catch::Contains("gone.xml"));
+    CHECK_THAT(fault(folder, use + "camera.xml", 1), Catch::Contains("camera.xml:1:") && Catch::Contains("$fov"));
+    CHECK_THAT(fault(folder, use + "camera.xml -D fov=50 -D angle=1", 1), Catch::Contains("$angle"));
+    CHECK_THAT(fault(folder, use + "camera.xml -D fov=50 --stats camera.xml", 2), Catch::Contains("camera.xml"));
+    // lobefit does not read the camera, so its command has no definitions for it.
+    const std::string line =
+        fault(folder, "loberender scene.xml -o c.exr --integrator product --spp 1 --camera camera.xml -D fov=50", 1);
+    CHECK_THAT(line, Catch::Contains("run: lobefit") && !Catch::Contains("fov"));
+  }
+}
+
 TEST_CASE("loberender: options that conflict with an illumination file are errors") {
   const SceneFolder folder(false);
   const std::vector<std::pair<std::string, std::string>> cases{
-      {" --illumination a.illum --passes 1", "--passes"},
       {" --illumination a.illum --train paths", "--train"},
       {" --illumination a.illum --components 4", "--components"},
-      {" --illumination a.illum --train-seconds 1", "--train-seconds"},
+      {" --illumination a.illum --photons 100", "--photons has no effect with --illumination, except with --passes or"},
       {" --illumination a.illum --bsdf-fraction fixed", "--bsdf-fraction"},
       {" --bsdf-fraction all", "--bsdf-fraction"},
       {" --components 9", "--components"},

@@ -49,8 +49,10 @@ class Field {
  public:
   /// A field without records that cannot be trained.
   Field();
-  /// A field without records, ready for training. Throws std::runtime_error for options out of range.
-  explicit Field(const FieldOptions& options);
+  /// A field ready for training, without records or, with the field of an earlier training of the same scene, with its
+  /// records: these stay as they are, and training adds records where none of them serves. Throws std::runtime_error
+  /// for options out of range.
+  explicit Field(const FieldOptions& options, const Field& earlier = Field());
   ~Field();
   Field(const Field&);
   Field& operator=(const Field&);

@@ -60,9 +60,10 @@ class PassSizes {
 /// from importons.
 class Training {
  public:
-  Training(const RenderScene& scene, const RayCamera& camera, const LobeCacheSet* caches, const TrainingPlan& plan)
+  Training(const RenderScene& scene, const RayCamera& camera, const LobeCacheSet* caches, const TrainingPlan& plan,
+           const Field& earlier)
       : plan_(plan),
-        radiance_(inScene(plan.records, scene)),
+        radiance_(inScene(plan.records, scene), earlier),
         importance_(importanceOptions(inScene(plan.records, scene))),
         radianceSampler_(scene.scene, radiance_, caches),
         importanceSampler_(scene.scene, importance_, nullptr) {
@@ -149,12 +150,12 @@ std::uint64_t TrainingReport::particles() const {
 }
 
 TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera& camera, const LobeCacheSet* caches,
-                                      const TrainingPlan& plan,
-                                      const std::function<void(const PassReport&)>& afterPass) {
+                                      const TrainingPlan& plan, const std::function<void(const PassReport&)>& afterPass,
+                                      const Field& earlier) {
   plan.validate();
   if (scene.tracer.bounds().isEmpty() || scene.lights.empty()) return {};
   const Stopwatch watch;
-  Training training(scene, camera, caches, plan);
+  Training training(scene, camera, caches, plan, earlier);
   TrainingReport report;
   PassSizes sizes(plan);
   for (int pass = 0; pass < plan.passes; ++pass) {

@@ -60,9 +60,11 @@ struct TrainedIllumination {
 };
 
 /// caches: for the product; nullptr: training paths are guided by illumination only. afterPass: called after each pass
-/// with its report.
+/// with its report. earlier: illumination trained for the same scene, with any camera; its records stay as they are and
+/// guide the training, which adds records where none of them serves.
 TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera& camera, const LobeCacheSet* caches,
                                       const TrainingPlan& plan,
-                                      const std::function<void(const PassReport&)>& afterPass = {});
+                                      const std::function<void(const PassReport&)>& afterPass = {},
+                                      const Field& earlier = Field());
 
 }  // namespace lobe
