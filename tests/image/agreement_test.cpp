@@ -4,6 +4,7 @@
 #include <limits>
 #include <numbers>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "runtime/core/random.h"
