@@ -14,6 +14,9 @@ import tempfile
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 SCENE = ROOT / "tests/data/room.xml"
 SKIPPED = 77
+# A lobe too narrow for Gaussians.
+MIRROR = """<scene version="2.1.0"><bsdf type="roughconductor" id="m"><float name="alpha" value="0.002"/></bsdf>
+  <shape type="sphere"><ref id="m"/></shape></scene>"""
 
 try:
     from selenium import webdriver
@@ -37,6 +40,9 @@ def make_pages(tools, folder):
     caches = [*(folder / "lobes").glob("*.lobe"), *(folder / "scene").glob("*.lobe")]
     run("lobedump", "--html", folder / "caches.html", "--scene", SCENE, *caches)
     run("lobedump", "--html", folder / "fits.html", caches[0])
+    (folder / "mirror.xml").write_text(MIRROR)
+    run("lobefit", folder / "mirror.xml", "-o", folder / "mirror", "--samples", 256)
+    run("lobedump", "--html", folder / "mirror.html", *(folder / "mirror").glob("*.lobe"))
     run("loberender", SCENE, "--cache", folder / "lobes", "--spp", 1, "--passes", 1, "--photons", 2000, "--importons", 1000, "--light-paths", "off",
         "--russian-roulette", "throughput", "-o", folder / "room.exr", "--save-illumination", folder / "room.illum")
     run("lobedump", "--html", folder / "light.html", folder / "room.illum")
@@ -146,6 +152,13 @@ def check_fits(driver, folder):
     page.finish()
 
 
+def check_mirror(driver, folder):
+    page = Page(driver, folder / "mirror.html")
+    assert not page.find("panels").is_displayed() and not page.find("directions-scale").is_displayed()
+    assert "left to BSDF sampling" in page.text("grades") and "no fit" in page.text("panels-hint")
+    page.finish()
+
+
 def check_light(driver, folder):
     page = Page(driver, folder / "light.html")
     for act in (lambda: page.find("map").send_keys(Keys.ARROW_LEFT), lambda: page.find("map").send_keys("+"),
@@ -178,7 +191,7 @@ def main():
         make_pages(pathlib.Path(sys.argv[1]).resolve(), folder)
         driver = start_browser()
         try:
-            for check in (check_caches, check_look_up, check_fits, check_light):
+            for check in (check_caches, check_look_up, check_fits, check_mirror, check_light):
                 check(driver, folder)
                 print(check.__name__, "passed", flush=True)
         finally:
