@@ -191,7 +191,7 @@ TEST_CASE("fitter: if one lobe fails the caches of the others are complete") {
                             <float name="alpha" value="{}"/></bsdf></shape>)",
                          0.1 + 0.05 * i);
   writeAtomically(folder / "scene.xml", scene + "</scene>");
-  const std::string fit = "lobefit scene.xml --method wem --elevations 48 --samples 1024 -o ";
+  const std::string fit = "lobefit scene.xml --method wem --elevations 24 --samples 512 -o ";
   REQUIRE(runBinary(folder.path(), fit + "clean").code == 0);
   std::vector<fs::path> names;
   for (const auto& entry : fs::directory_iterator(folder / "clean")) names.push_back(entry.path().filename());
