@@ -34,8 +34,12 @@ class ForkJoin {
   ForkJoin(const ForkJoin&) = delete;
   ForkJoin& operator=(const ForkJoin&) = delete;
 #if defined(__SANITIZE_THREAD__)
-  ForkJoin() { __tsan_release(&fork_); }
-  ~ForkJoin() { __tsan_acquire(&join_); }
+  ForkJoin() {
+    __tsan_release(&fork_);
+  }
+  ~ForkJoin() {
+    __tsan_acquire(&join_);
+  }
   template <class Body, class... Arguments>
   void run(const Body& body, const Arguments&... arguments) {
     __tsan_acquire(&fork_);
@@ -65,7 +69,8 @@ template <class Index, class Body>
 void parallelFor(Index begin, Index end, const Body& body) {
   tbb::task_group_context context;  // bound to the enclosing loop, if there is one, and cancelled with it
   ForkJoin order;
-  tbb::parallel_for(begin, end, [&](Index i) { order.run(body, i); }, context);
+  tbb::parallel_for(
+      begin, end, [&](Index i) { order.run(body, i); }, context);
   if (context.is_group_execution_cancelled()) throw LoopCancelled();
 }
 
