@@ -153,7 +153,7 @@ void checkImageName(const std::filesystem::path& path) {
 
 void writePng(const std::filesystem::path& path, int width, int height, const std::vector<std::uint8_t>& rgb) {
   std::vector<std::byte> bytes;
-  if (!stbi_write_png_to_func(appendBytes, &bytes, width, height, 3, rgb.data(), 3 * width))
+  if (width < 1 || height < 1 || !stbi_write_png_to_func(appendBytes, &bytes, width, height, 3, rgb.data(), 3 * width))
     throw std::runtime_error(fmt::format("{}: the image cannot be encoded as PNG", path.string()));
   writeAtomically(path, std::span<const std::byte>(bytes));
 }
