@@ -206,6 +206,21 @@ TEST_CASE("gradients: directly visible light has exact differences") {
     CHECK(pixel.y() == Approx(0.5).epsilon(1e-6));
 }
 
+TEST_CASE("gradients: visible emission does not spread to the pixels around it") {
+  GradientFilm film(9, 9);
+  for (int y = 0; y < 9; ++y)
+    for (int x = 0; x < 9; ++x) {
+      GradientSample sample;
+      sample.radiance = grey(1);
+      if (x == 4 && y == 4) sample.visible = grey(1000);
+      film.add(x, y, sample);
+    }
+  const Image image = film.reconstruct(ReconstructionNorm::l2).image;
+  for (int y = 0; y < 9; ++y)
+    for (int x = 0; x < 9; ++x) CHECK(image.at(x, y).x() == Approx(x == 4 && y == 4 ? 1001 : 1).epsilon(1e-4));
+  CHECK(film.pixels().mean().at(4, 4).x() == Approx(1001));
+}
+
 TEST_CASE("gradients: the same bytes on any number of threads") {
   const Scene scene = boxScene(std::make_shared<HalfMirror>(0.4f, 0.2f, 0.3f), 0.5f);
   const auto renderWith = [&](std::size_t threads, ReconstructionNorm norm) {

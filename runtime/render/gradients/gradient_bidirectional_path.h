@@ -146,7 +146,10 @@ class GradientBidirectionalPath {
 
   // Adds emission where the path has arrived; returns false if it ends there.
   bool arrive() {
-    if (paths_.depth > 1 || options_.emitterVisibility == EmitterVisibility::shown) addEmission();
+    if (paths_.depth > 1)
+      addEmission();
+    else if (options_.emitterVisibility == EmitterVisibility::shown)
+      result_.visible += emitted(paths_.hit, paths_.direction);
     return paths_.arrive();
   }
 
@@ -154,12 +157,8 @@ class GradientBidirectionalPath {
     const Rgb radiance = emitted(paths_.hit, paths_.direction);
     if (!(radiance.maxCoeff() > 0.0f)) return;
     const auto& weights = paths_.weights;
-    const auto total = [&](const PartialWeights& all, const std::optional<LightSelection>& nextEvent,
-                           const std::optional<SurfaceHit>& hit, const Vec3& direction) {
-      return paths_.depth == 1 ? 1.0 : 1.0 + othersOfEmission(all, nextEvent, hit, direction);
-    };
     Contribution base(paths_.throughput * radiance, 1.0,
-                      total(weights.base.all, weights.base.nextEvent, paths_.hit, paths_.direction));
+                      totalOfEmission(weights.base.all, weights.base.nextEvent, paths_.hit, paths_.direction));
     result_.radiance += base.weighted();
     for (std::size_t i = 0; i < paths_.offsets.size(); ++i) {
       const OffsetPath& offset = paths_.offsets[i];
@@ -169,10 +168,10 @@ class GradientBidirectionalPath {
         const Vec3& direction = offset.state == State::apart ? offset.direction : paths_.direction;
         const std::optional<LightSelection>& nextEvent = weights.offsets[i].nextEvent;
         const double own2 = squared(offset.ratio);
-        base.group2 = total(weights.pairs[i].baseGroup, weights.base.nextEvent, paths_.hit, paths_.direction);
+        base.group2 = totalOfEmission(weights.pairs[i].baseGroup, weights.base.nextEvent, paths_.hit, paths_.direction);
         shifted.emplace(offset.throughput * emitted(hit, direction),
-                        own2 * total(weights.pairs[i].group, nextEvent, hit, direction),
-                        own2 * total(weights.offsets[i].all, nextEvent, hit, direction));
+                        own2 * totalOfEmission(weights.pairs[i].group, nextEvent, hit, direction),
+                        own2 * totalOfEmission(weights.offsets[i].all, nextEvent, hit, direction));
       }
       result_.differences[i] += weightedDifference(base, shifted);
     }
@@ -182,14 +181,16 @@ class GradientBidirectionalPath {
     return hit ? emittedRadiance(*hit) : scene_.lights.environmentRadiance(direction);
   }
 
-  double othersOfEmission(const PartialWeights& weights, const std::optional<LightSelection>& nextEvent,
-                          const std::optional<SurfaceHit>& hit, const Vec3& direction) const {
+  // The sum of the squared densities of the techniques that `weights` includes, relative to that of finding the
+  // emission.
+  double totalOfEmission(const PartialWeights& weights, const std::optional<LightSelection>& nextEvent,
+                         const std::optional<SurfaceHit>& hit, const Vec3& direction) const {
     const Lights& lights = scene_.lights;
     if (!hit)
-      return weights.atLight(nextEvent ? nextEvent->environmentPdf(direction) : 0.0f,
-                             lights.environmentPhotonDensity(direction), 1.0f);
-    return weights.atLight(nextEvent ? nextEvent->pdf(*hit) : 0.0f, lights.photonDensity(*hit),
-                           std::abs(hit->normal.dot(hit->woWorld)));
+      return 1.0 + weights.atLight(nextEvent ? nextEvent->environmentPdf(direction) : 0.0f,
+                                   lights.environmentPhotonDensity(direction), 1.0f);
+    return 1.0 + weights.atLight(nextEvent ? nextEvent->pdf(*hit) : 0.0f, lights.photonDensity(*hit),
+                                 std::abs(hit->normal.dot(hit->woWorld)));
   }
 
   // Returns false if the path ends.

@@ -72,13 +72,19 @@ class GradientPath {
 
   // Adds emission where the path has arrived; returns false if it ends there.
   bool arrive() {
-    if (paths_.depth > 1 || options_.emitterVisibility == EmitterVisibility::shown) addEmission();
+    if (paths_.depth > 1)
+      addEmission();
+    else if (options_.emitterVisibility == EmitterVisibility::shown)
+      result_.visible += emitted();
     return paths_.arrive();
   }
 
+  Rgb emitted() const {
+    return paths_.hit ? emittedRadiance(*paths_.hit) : scene_.lights.environmentRadiance(paths_.direction);
+  }
+
   void addEmission() {
-    const Rgb radiance =
-        paths_.hit ? emittedRadiance(*paths_.hit) : scene_.lights.environmentRadiance(paths_.direction);
+    const Rgb radiance = emitted();
     if (!(radiance.maxCoeff() > 0.0f)) return;
     const Contribution base(paths_.throughput * radiance, 1.0, 1.0 / misWeight(paths_.weights.base, paths_.hit));
     result_.radiance += base.weighted();
