@@ -463,6 +463,17 @@ TEST_CASE("light paths: light that next-event estimation sees through surfaces g
   CHECK(agree(path, renderBlocks(stage, stage.pathWithLight(), {48, 24, 2000})));
 }
 
+TEST_CASE("light paths: light whose solid angle a refracting surface changes gives the image of path tracing") {
+  // Camera and walls are in glass. Next-event estimation finds the environment through its surface, about as often as
+  // light paths.
+  Scene scene = sceneWith(std::string(kFloor) + R"(<shape type="cube"><transform name="to_world">
+    <scale x="8" y="8" z="2"/><translate z="1"/></transform><bsdf type="dielectric"/></shape>)");
+  scene.environment = brightSpot();
+  const Stage stage(std::move(scene));
+  const auto path = renderBlocks(stage, stage.path(), {48, 32, 1});
+  CHECK(agree(path, renderBlocks(stage, stage.pathWithLight(4), {48, 12, 2000})));
+}
+
 TEST_CASE("light paths: guided emission of the environment gives the image of path tracing") {
   Scene scene = sceneWith(std::string(kFloor) + kLamp + R"(<shape type="sphere">
     <point name="center" x="0.8" y="-0.3" z="1"/><float name="radius" value="0.9"/><bsdf type="dielectric"/></shape>)");

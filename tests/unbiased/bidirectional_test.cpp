@@ -1,5 +1,5 @@
-// Bidirectional path tracing that is guided in both directions estimates the image of path tracing, and a wrong density
-// of either guide is detected.
+// Bidirectional path tracing that is guided in both directions, and guided path tracing with light paths, estimate the
+// image of path tracing, and a wrong density of either guide is detected.
 
 #include <fstream>
 
@@ -12,6 +12,7 @@
 using namespace lobe;
 using lobe::test::agree;
 using lobe::test::Batches;
+using lobe::test::PathWithLight;
 using lobe::test::renderBlocks;
 using lobe::test::Studio;
 
@@ -56,6 +57,7 @@ struct WrongSampler {
       return sample;
     }
     float pdf(const Vec3& wi) const { return vertex_.pdf(wi) * fault_; }
+    std::optional<VertexEstimate> estimate() const { return vertex_.estimate(); }
 
    private:
     GuidedSampler::Vertex vertex_;
@@ -91,6 +93,20 @@ TEST_CASE("unbiased: bidirectional path tracing guided in both directions gives 
   CHECK(agree(path, renderBlocks(camera, studio.productBdpt(), {48, 8, 200})));
   CHECK_FALSE(agree(path, renderBlocks(camera, WrongBdpt(studio, 1.2f, 1), {48, 8, 200})));
   CHECK_FALSE(agree(path, renderBlocks(camera, WrongBdpt(studio, 1, 1.2f), {48, 8, 200})));
+}
+
+TEST_CASE("unbiased: guided path tracing with light paths gives the image of path tracing", "[slow]") {
+  const Studio studio = roomStudio(20, 15);
+  const RayCamera& camera = studio.camera();
+  const auto path = renderBlocks(camera, studio.path(), {48, 64, 1});
+  const LightTracing tracing{2, PhotonEmission(studio.renderScene().lights)};
+  const GuidedLightIntegrator product(studio.renderScene(), camera, {}, studio.productSampler(), tracing);
+  CHECK(agree(path, renderBlocks(camera, product, {48, 16, 300})));
+  const auto wrong = [&](float fault) {
+    return PathWithLight<WrongSampler>(studio.renderScene(), camera, {}, tracing, {studio.productSampler(), fault});
+  };
+  CHECK(agree(path, renderBlocks(camera, wrong(1), {48, 16, 400})));
+  CHECK_FALSE(agree(path, renderBlocks(camera, wrong(1.2f), {48, 16, 400})));
 }
 
 TEST_CASE("unbiased: guided bidirectional path tracing does not depend on the number of threads", "[slow]") {
