@@ -78,13 +78,13 @@ class BidirectionalPaths {
   struct Vertex {
     Vertex(const Guide& guide, const SurfaceHit& h, const Walk& walk, const PartialWeights& partial, float fraction)
         : hit(h),
-          throughput(walk.throughput),
           weights(partial),
+          throughput(walk.throughput),
           depth(walk.depth),
           smooth(fraction),
-          delta(walk.delta),
           arrivalPdf(walk.pdf),
           survival(walk.survival),
+          delta(walk.delta),
           sampler(guide, hit) {}
     Vertex(const Vertex&) = delete;
     Vertex& operator=(const Vertex&) = delete;
@@ -93,13 +93,13 @@ class BidirectionalPaths {
     float pdf(const Vec3& direction) const { return smooth * sampler.pdf(hit.frame.toLocal(direction)); }
 
     SurfaceHit hit;
-    Rgb throughput;
     PartialWeights weights;
+    Rgb throughput;
     int depth;         // segments from the origin of the subpath
     float smooth;      // probability of sampling the non-delta component
-    bool delta;        // Walk::delta
     float arrivalPdf;  // Walk::pdf
     float survival;    // Walk::survival
+    bool delta;        // Walk::delta
     typename Guide::Vertex sampler;
   };
   using CameraVertex = Vertex<CameraGuide>;
