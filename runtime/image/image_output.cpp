@@ -22,7 +22,9 @@
 #include "runtime/core/colour.h"
 #include "runtime/core/files.h"
 
+#ifndef __clang_analyzer__  // which reports code of the library
 #define STB_IMAGE_WRITE_IMPLEMENTATION
+#endif
 #define STB_IMAGE_WRITE_STATIC
 #include <stb/stb_image_write.h>
 

@@ -66,7 +66,6 @@ class Studio {
   const Scene& scene() const { return scene_; }
   const GuidedSampler& guidedSampler() const { return *guided_; }
   const GuidedSampler& productSampler() const { return *product_; }
-  const GuidedSampler& guidedSampler() const { return *guided_; }
   const GuidedSampler& importanceSampler() const { return *importanceSampler_; }
   const IlluminationCache& illumination() const { return cacheOf(illumination_); }
   const Field& importance() const { return importance_; }

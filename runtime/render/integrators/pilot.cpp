@@ -94,6 +94,7 @@ std::vector<PilotResult> comparePilots(const RayCamera& camera, std::span<const 
       tileMeans[i / tiling.pixelsPerTile()] +=
           ofIntegrator[i].mean() / static_cast<double>(tiling.pixelsPerTile() * integrators.size());
   std::vector<double> luminances;
+  luminances.reserve(tileMeans.size());
   for (const Radiance& mean : tileMeans) luminances.push_back(luminance(mean.cast<float>().eval()));
   const double dark = kDark * median(std::move(luminances));
   std::vector<PilotResult> results;
