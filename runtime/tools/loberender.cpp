@@ -161,7 +161,8 @@ void declare(CLI::App& app, Options& options) {
   app.add_option(
          "--gradients", job.gradients,
          "Gradient-domain rendering with path, bdpt, guided or product: samples the differences of neighbouring "
-         "pixels, too, and reconstructs the picture from them in l2 (unbiased, except that negative pixels become zero) "
+         "pixels, too, and reconstructs the picture from them in l2 (unbiased, except that negative pixels become "
+         "zero) "
          "or l1 (less noise from outliers, but biased)")
       ->transform(oneOf(kNormNames));
   app.add_option("--spp", job.samples, "Number of samples per pixel");
