@@ -79,6 +79,8 @@ void RenderJob::validate() const {
           "--gradients cannot be combined with --sample-offset, because a picture is reconstructed as a whole");
   require(!gradients || (checkpoint.empty() && resume.empty()),
           "--gradients cannot be combined with --checkpoint and --resume, because a checkpoint holds no gradients");
+  require(!gradients || !fireflyLimit,
+          "--gradients cannot be combined with --firefly-limit, because the differences of pixels are not limited");
   require(!gradients || !aovs.contains(Aov::variance),
           "--gradients cannot be combined with --aov variance, because it is not known for a reconstructed picture");
   require(merge.first > 0 && std::isfinite(merge.first), "--merge-radius must be a finite number greater than 0");

@@ -66,8 +66,9 @@ TEST_CASE("pilot: pixels are spread over the columns of the image") {
   const NoisyAtTheRight noisy(edge.x() / edge.z());
   const std::array<const Integrator*, 1> one{&noisy};
   const auto results = comparePilots(camera, one, {.tiles = 128, .samples = 32, .seed = 5});
-  // The mean of 32 uniform numbers has variance 1 / 96; the squared mean is 1 + ¼. The worst pixels are left out.
-  CHECK(results[0].variance == Approx(0.25 / 96 / 1.25).epsilon(0.25));
+  // The mean of 32 uniform numbers has variance 1 / 96; the squared mean is 1 + ¼. The worst pixels, 2 % of those with
+  // noise, are left out; they have 15 % of the variance, because the means are nearly normal.
+  CHECK(results[0].variance == Approx(0.85 * 0.25 / 96 / 1.25).epsilon(0.15));
 }
 
 TEST_CASE("pilot: works for images smaller than a tile, and for black ones") {

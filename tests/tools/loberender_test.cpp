@@ -173,6 +173,7 @@ TEST_CASE("loberender: invalid command lines are errors") {
       {" --spp 1 --gradients l2 --integrator vcm",
        "--gradients requires --integrator auto, path, bdpt, guided or product"},
       {" --spp 1 --gradients l2 --sample-offset 1", "--gradients cannot be combined with --sample-offset"},
+      {" --spp 1 --gradients l2 --firefly-limit 5", "--gradients cannot be combined with --firefly-limit"},
       {" --spp 1 --gradients l2 --checkpoint c", "--gradients cannot be combined with --checkpoint"},
       {" --spp 1 --unknown", "--unknown"}};
   for (const auto& [options, word] : cases)
