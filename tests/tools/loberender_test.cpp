@@ -240,7 +240,7 @@ TEST_CASE("loberender: bidirectional pictures do not depend on the number of thr
   const std::string guide = GENERATE("none", "illumination", "product");
   const std::string render = "loberender scene.xml --integrator bdpt --spp 4 --seed 9 --guide " + guide + kTraining;
   for (const std::string threads : {"1", "2", "7"})
-    REQUIRE(folder.run(render + " --threads " + threads + " -o " + threads + ".exr --stats s.json").code == 0);
+    REQUIRE(folder.run(fmt::format("{0} --threads {1} -o {1}.exr --stats s.json", render, threads)).code == 0);
   CHECK(folder.bytes("1.exr") == folder.bytes("2.exr"));
   CHECK(folder.bytes("1.exr") == folder.bytes("7.exr"));
   const auto s = nlohmann::json::parse(folder.bytes("s.json"));
@@ -258,7 +258,7 @@ TEST_CASE("loberender: pictures from gradients do not depend on the number of th
   const std::string render =
       "loberender scene.xml --spp 4 --seed 9 --integrator " + integrator + " --gradients " + norm + kTraining;
   for (const std::string threads : {"1", "2", "7"})
-    REQUIRE(folder.run(render + " --threads " + threads + " -o " + threads + ".exr").code == 0);
+    REQUIRE(folder.run(fmt::format("{0} --threads {1} -o {1}.exr", render, threads)).code == 0);
   CHECK(folder.bytes("1.exr") == folder.bytes("2.exr"));
   CHECK(folder.bytes("1.exr") == folder.bytes("7.exr"));
   for (const Rgb& pixel : readImage(folder / "1.exr").pixels) CHECK(pixel.minCoeff() >= 0);
@@ -273,7 +273,7 @@ TEST_CASE("loberender: pictures with light paths do not depend on the number of 
   const std::string integrator = GENERATE("guided", "product");
   const std::string render = "loberender scene.xml --light-paths on --seed 9 --integrator " + integrator + kTraining;
   for (const std::string threads : {"1", "2", "7"})
-    REQUIRE(folder.run(render + " --spp 4 --stats s.json --threads " + threads + " -o " + threads + ".exr").code == 0);
+    REQUIRE(folder.run(fmt::format("{0} --spp 4 --stats s.json --threads {1} -o {1}.exr", render, threads)).code == 0);
   CHECK(folder.bytes("1.exr") == folder.bytes("2.exr"));
   CHECK(folder.bytes("1.exr") == folder.bytes("7.exr"));
   const auto s = nlohmann::json::parse(folder.bytes("s.json"));
