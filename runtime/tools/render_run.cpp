@@ -220,7 +220,8 @@ void Run::readIllumination(const IlluminationFile& file, const std::filesystem::
 
 void Run::makeGuiding() {
   const TrainingPlan plan = planOf(job_);
-  if (!resumed_ && (job_.illumination.empty() || job_.trainsFurther())) train(plan, *renderScene_, *camera_, guiding_);
+  if (!resumed_ && (job_.illumination.empty() || job_.trainsFurther()))
+    train(job_, plan, *renderScene_, *camera_, guiding_);
   if (!job_.checkpoint.empty() || !job_.saveIllumination.empty())
     illumination_ = encodeIllumination(guiding_.training, plan, *scene_, job_.scene);
   if (!job_.checkpoint.empty() && guiding_.training.importance.records() > 0)

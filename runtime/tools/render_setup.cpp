@@ -21,6 +21,16 @@ namespace {
 // after 21 seconds.
 constexpr double kTrainingFraction = 0.15;
 
+/// Fraction of --seconds after which automatic compares path and product for the first time.
+constexpr double kTrialFraction = 0.03;
+
+/// Whether automatic compares path and product during training. With limits that are given, or if the illumination is
+/// saved for other runs, all of it is trained.
+bool decidesEarly(const RenderJob& job) {
+  return job.integrator == IntegratorKind::automatic && job.seconds && !job.trainSeconds && !job.passes &&
+         job.saveIllumination.empty();
+}
+
 /// The fraction of a full-sized pilot, and of the paths for learning counts, so that both take a few percent of the
 /// time of a short run. With --spp it does not depend on the number of samples, so that parts of a picture
 /// (--sample-offset) use the same counts and the same integrator.
@@ -29,13 +39,16 @@ double preparationSize(const RenderJob& job) {
   return job.seconds ? std::clamp(*job.seconds / kSeconds, kLeast, 1.0) : 1.0;
 }
 
-void learnCounts(const RenderJob& job, const RenderScene& scene, const RayCamera& camera, const PathOptions& options,
-                 Guiding& guiding) {
+/// size: the fraction of the paths of a full learning.
+SampleCountModel learnCounts(const RenderJob& job, const RenderScene& scene, const RayCamera& camera,
+                             const PathOptions& options, const GuidedSampler& sampler, std::size_t records,
+                             double size) {
   constexpr double kPaths = 100000;
-  const Stopwatch watch;
-  guiding.counts = learnSampleCounts(scene, camera, options, *guiding.sampler, guiding.training.field.records(),
-                                     static_cast<int>(kPaths * preparationSize(job)), job.seed);
-  guiding.secondsCounts = watch.seconds();
+  return learnSampleCounts(scene, camera, options, sampler, records, static_cast<int>(kPaths * size), job.seed);
+}
+
+bool usesCounts(const RenderJob& job) {
+  return job.russianRoulette == RussianRoulette::efficiency && !job.gradients;
 }
 
 PathOptions pathOptions(const RenderJob& job, const Scene& scene) {
@@ -73,6 +86,7 @@ std::unique_ptr<BidirectionalIntegrator> makeWithLightPaths(const RenderJob& job
                                                  LightTracing{trial.pathsPerPixel, emission});
 }
 
+/// Compares path and product with this sampler, to set guiding.pilot.
 Pilot runPilot(const RenderJob& job, const RayCamera& camera, const Integrator& path, const Integrator& guided) {
   const Stopwatch watch;
   PilotOptions pilot;
@@ -84,20 +98,58 @@ Pilot runPilot(const RenderJob& job, const RayCamera& camera, const Integrator& 
   return {results[0], results[1], watch.seconds()};
 }
 
+/// Compares path and product with what has been learnt so far in training, and sets guiding.pilot.
+void runPilotEarly(const RenderJob& job, const RenderScene& scene, const RayCamera& camera, const Field& field,
+                   Guiding& guiding) {
+  constexpr double kCountsSize = 0.25;
+  const Stopwatch watch;
+  const GuidedSampler sampler(scene.scene, field, guiding.cachesOrNull());
+  PathOptions options = pathOptions(job, scene.scene);
+  const PathIntegrator path(scene, options);
+  std::optional<SampleCountModel> counts;
+  if (usesCounts(job)) {
+    counts = learnCounts(job, scene, camera, options, sampler, field.records(), kCountsSize * preparationSize(job));
+    options.counts = &*counts;
+  }
+  const double earlier = guiding.pilot ? guiding.pilot->seconds : 0;
+  guiding.pilot = runPilot(job, camera, path, GuidedIntegrator(scene, options, sampler));
+  guiding.pilot->seconds = earlier + watch.seconds();
+}
+
+/// Decides for automatic how long to train. Where path tracing is better, training is lost time. So the integrators are
+/// compared twice in its course, with few passes: product seldom wins later where it is clearly worse after the first,
+/// and where it is not clearly better after the second, rendering uses the time better.
+ExtendTraining decideEarly(const RenderJob& job, const RenderScene& scene, const RayCamera& camera, Guiding& guiding) {
+  return [&, comparisons = 0](const Field& field) mutable -> std::optional<double> {
+    constexpr double kWorse = 1.2, kBetter = 0.6;
+    if (++comparisons > 2) return std::nullopt;
+    runPilotEarly(job, scene, camera, field, guiding);
+    const double ratio = guiding.pilot->ratio();
+    if (comparisons == 1 && ratio > kBetter)
+      return ratio > kWorse ? std::nullopt : std::optional(2 * kTrialFraction * *job.seconds);
+    comparisons = 2;
+    return guiding.prefersPath() ? std::nullopt : std::optional(kTrainingFraction * *job.seconds);
+  };
+}
+
 /// path, guided or product.
 AnyIntegrator makeUnidirectional(const RenderJob& job, const RenderScene& scene, const RayCamera& camera,
                                  Guiding& guiding) {
   PathOptions options = pathOptions(job, scene.scene);
-  auto path = std::make_unique<PathIntegrator>(scene, options);
-  if (!guiding.sampler) return path;
-  if (job.russianRoulette == RussianRoulette::efficiency && !job.gradients) {
-    learnCounts(job, scene, camera, options, guiding);
-    options.counts = &*guiding.counts;
+  if (!guiding.sampler || guiding.prefersPath()) return std::make_unique<PathIntegrator>(scene, options);
+  if (usesCounts(job)) {
+    const Stopwatch watch;
+    guiding.counts = learnCounts(job, scene, camera, options, *guiding.sampler, guiding.training.field.records(),
+                                 preparationSize(job));
+    guiding.secondsCounts = watch.seconds();
   }
+  const PathOptions optionsOfPath = options;
+  if (guiding.counts) options.counts = &*guiding.counts;
   auto guided = std::make_unique<GuidedIntegrator>(scene, options, *guiding.sampler);
-  if (job.integrator == IntegratorKind::automatic) {
-    if (!guiding.pilot) guiding.pilot = runPilot(job, camera, *path, *guided);
-    if (guiding.pilot->best() == IntegratorKind::path) return path;
+  if (job.integrator == IntegratorKind::automatic && !guiding.pilot) {
+    auto path = std::make_unique<PathIntegrator>(scene, optionsOfPath);
+    guiding.pilot = runPilot(job, camera, *path, *guided);
+    if (guiding.prefersPath()) return path;
   }
   if (auto withLightPaths = makeWithLightPaths(job, scene, camera, options, guiding)) return withLightPaths;
   return guided;
@@ -107,8 +159,7 @@ AnyIntegrator makeUnidirectional(const RenderJob& job, const RenderScene& scene,
 std::unique_ptr<GradientIntegrator> makeGradients(const RenderJob& job, const RenderScene& scene,
                                                   const RayCamera& camera, const Guiding& guiding) {
   const PathOptions options = pathOptions(job, scene.scene);
-  const bool path = !guiding.sampler || (guiding.pilot && guiding.pilot->best() == IntegratorKind::path);
-  if (path) return std::make_unique<PathGradients>(scene, camera, options);
+  if (!guiding.sampler || guiding.prefersPath()) return std::make_unique<PathGradients>(scene, camera, options);
   return std::make_unique<GuidedGradients>(scene, camera, options, *guiding.sampler);
 }
 
@@ -146,13 +197,18 @@ TrainingPlan planOf(const RenderJob& job) {
   return plan;
 }
 
-void train(const TrainingPlan& plan, const RenderScene& scene, const RayCamera& camera, Guiding& guiding) {
+void train(const RenderJob& job, const TrainingPlan& plan, const RenderScene& scene, const RayCamera& camera,
+           Guiding& guiding) {
   const bool timed = plan.seconds < kInfinity;
   Progress progress("training", timed ? plan.seconds : plan.passes);
   const TrainedIllumination earlier = std::move(guiding.training);
+  const bool early = decidesEarly(job);
+  TrainingPlan start = plan;
+  if (early) start.seconds = kTrialFraction * *job.seconds;
   guiding.training = trainIllumination(
-      scene, camera, guiding.cachesOrNull(), plan,
-      [&](const PassReport& pass) { progress.advance(timed ? pass.seconds : 1.0); }, earlier.field);
+      scene, camera, guiding.cachesOrNull(), start,
+      [&](const PassReport& pass) { progress.advance(timed ? pass.seconds : 1.0); }, earlier.field,
+      early ? decideEarly(job, scene, camera, guiding) : ExtendTraining());
   if (earlier.field.records() > 0 && !earlier.report.learntFractions) guiding.training.report.learntFractions = false;
 }
 

@@ -305,6 +305,32 @@ TEST_CASE("stability: a lamp a million times brighter than the visible one") {
   checkUnbiased(twoRooms(1e6f, 1), 128);
 }
 
+TEST_CASE("stability: training goes on after its time limit only if it is extended") {
+  const Scene scene = roomScene();
+  const RenderScene ready(scene);
+  const RayCamera camera(scene.camera, scene.filter);
+  TrainingPlan plan = smallPlan(TrainFrom::both);
+  plan.passes = 6;
+  plan.seconds = 1e-9;
+  std::vector<std::size_t> seen;
+  const auto passesWith = [&](std::vector<std::optional<double>> limits) {
+    seen.clear();
+    const auto extend = [&](const Field& field) {
+      seen.push_back(field.records());
+      return seen.size() <= limits.size() ? limits[seen.size() - 1] : std::nullopt;
+    };
+    return trainIllumination(ready, camera, nullptr, plan, {}, Field(), extend).report.passes.size();
+  };
+  CHECK(trainIllumination(ready, camera, nullptr, plan).report.passes.size() == 1);
+  CHECK(passesWith({}) == 1);
+  REQUIRE(seen.size() == 1);
+  CHECK(seen[0] > 0);
+  CHECK(passesWith({2e-9, std::nullopt}) == 1);
+  CHECK(seen.size() == 2);
+  CHECK(passesWith({1e9}) == 6);
+  CHECK(seen.size() == 1);
+}
+
 TEST_CASE("stability: training does not depend on the number of threads") {
   const Scene scene = roomScene();
   const auto train = [&](TrainFrom from, std::size_t threads) {

@@ -27,6 +27,8 @@ class PassSizes {
  public:
   explicit PassSizes(const TrainingPlan& plan) : limit_(plan.seconds), next_(limit_ < kInfinity ? firstOf(plan) : 1) {}
 
+  void setLimit(double seconds) { limit_ = seconds; }
+
   /// The fraction for the next pass, in (0, 1]; nullopt if it would not end in time. The first pass always runs.
   std::optional<double> next() const {
     if (taken_ == 0 || limit_ == kInfinity) return next_;
@@ -126,6 +128,18 @@ class Training {
   SampleStorage samples_;  // of the last pass
 };
 
+/// Runs passes, after those that the report has, up to the number of the plan or as long as `sizes` allows.
+void runPasses(Training& training, const TrainingPlan& plan, PassSizes& sizes, TrainingReport& report,
+               const std::function<void(const PassReport&)>& afterPass) {
+  for (int pass = static_cast<int>(report.passes.size()); pass < plan.passes; ++pass) {
+    const std::optional<double> size = sizes.next();
+    if (!size) break;
+    report.passes.push_back(training.runPass(pass, *size));
+    sizes.passDone(*size, report.passes.back().seconds);
+    if (afterPass) afterPass(report.passes.back());
+  }
+}
+
 }  // namespace
 
 std::map<std::string, TrainFrom> trainFromNames() {
@@ -151,22 +165,25 @@ std::uint64_t TrainingReport::particles() const {
 
 TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera& camera, const LobeCacheSet* caches,
                                       const TrainingPlan& plan, const std::function<void(const PassReport&)>& afterPass,
-                                      const Field& earlier) {
+                                      const Field& earlier, const ExtendTraining& extend) {
   plan.validate();
   if (scene.tracer.bounds().isEmpty() || scene.lights.empty()) return {};
   const Stopwatch watch;
   Training training(scene, camera, caches, plan, earlier);
   TrainingReport report;
   PassSizes sizes(plan);
-  for (int pass = 0; pass < plan.passes; ++pass) {
-    const std::optional<double> size = sizes.next();
-    if (!size) break;
-    report.passes.push_back(training.runPass(pass, *size));
-    sizes.passDone(*size, report.passes.back().seconds);
-    if (afterPass) afterPass(report.passes.back());
+  runPasses(training, plan, sizes, report, afterPass);
+  double deciding = 0;
+  while (extend && std::ssize(report.passes) < plan.passes) {
+    const double before = watch.seconds();
+    const std::optional<double> limit = extend(training.radiance());
+    deciding += watch.seconds() - before;
+    if (!limit) break;
+    sizes.setLimit(*limit + deciding);
+    runPasses(training, plan, sizes, report, afterPass);
   }
   training.finish(static_cast<int>(report.passes.size()), sizes.last());
-  report.seconds = watch.seconds();
+  report.seconds = watch.seconds() - deciding;
   report.undersampledFraction = training.radiance().undersampledFraction();
   report.learntFractions = plan.learnFractions && caches != nullptr;
   TrainedIllumination trained{training.radiance().frozen(), report, {}, {}};

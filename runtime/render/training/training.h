@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -59,12 +60,16 @@ struct TrainedIllumination {
   Field importance;         ///< learnt from importons, if kept; without records if training traces no photons
 };
 
+/// Called with what has been learnt when the time limit of training is reached. Returns a later limit, or nullopt to
+/// end the training. Its own time does not count as training.
+using ExtendTraining = std::function<std::optional<double>(const Field& field)>;
+
 /// caches: for the product; nullptr: training paths are guided by illumination only. afterPass: called after each pass
 /// with its report. earlier: illumination trained for the same scene, with any camera; its records stay as they are and
 /// guide the training, which adds records where none of them serves.
 TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera& camera, const LobeCacheSet* caches,
                                       const TrainingPlan& plan,
                                       const std::function<void(const PassReport&)>& afterPass = {},
-                                      const Field& earlier = Field());
+                                      const Field& earlier = Field(), const ExtendTraining& extend = {});
 
 }  // namespace lobe
