@@ -2,33 +2,28 @@
 
 #include "runtime/render/gradients/gradient_bidirectional_path.h"
 #include "runtime/render/gradients/gradient_path.h"
-#include "runtime/render/integrators/path_integrator.h"
 
 namespace lobe {
 
-GradientSample PathGradients::sample(int x, int y, Sampler& rng, PathStatistics& statistics) const {
-  const BsdfSampler sampler;
-  const GradientContext<BsdfSampler> context{scene_, camera_, options_, sampler};
-  return GradientPath(context, rng, statistics).trace(x, y);
+template <class Guide>
+GradientSample PathGradientsOf<Guide>::sample(int x, int y, Sampler& rng, PathStatistics& statistics) const {
+  return GradientPath(GradientContext{scene_, camera_, options_, guide_}, rng, statistics).trace(x, y);
 }
 
-GradientSample GuidedGradients::sample(int x, int y, Sampler& rng, PathStatistics& statistics) const {
-  const GradientContext<GuidedSampler> context{scene_, camera_, options_, sampler_};
-  return GradientPath(context, rng, statistics).trace(x, y);
+template class PathGradientsOf<BsdfSampler>;
+template class PathGradientsOf<const GuidedSampler&>;
+
+template <class CameraGuide, class LightGuide>
+GradientSample BdptGradientsOf<CameraGuide, LightGuide>::sample(int x, int y, Sampler& rng, Sampler& lightRng,
+                                                                PathStatistics& statistics,
+                                                                GradientSplats splats) const {
+  return GradientBidirectionalPath(GradientContext{scene_, camera_, options_, cameraGuide_}, lightGuide_, rng,
+                                   statistics)
+      .trace(x, y, lightRng, splats);
 }
 
-GradientSample BdptGradients::sample(int x, int y, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
-                                     GradientSplats splats) const {
-  const BsdfSampler sampler;
-  const GradientContext<BsdfSampler> context{scene_, camera_, options_, sampler};
-  return GradientBidirectionalPath(context, sampler, rng, statistics).trace(x, y, lightRng, splats);
-}
-
-GradientSample GuidedBdptGradients::sample(int x, int y, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
-                                           GradientSplats splats) const {
-  const GradientContext<GuidedSampler> context{scene_, camera_, options_, cameraGuide_};
-  return GradientBidirectionalPath(context, lightGuide_, rng, statistics).trace(x, y, lightRng, splats);
-}
+template class BdptGradientsOf<BsdfSampler, BsdfSampler>;
+template class BdptGradientsOf<const GuidedSampler&, const GuidedSampler&>;
 
 RenderResult render(const RayCamera& camera, const GradientIntegrator& integrator, GradientFilm& film,
                     const RenderOptions& options, const AfterWave& afterWave, const RenderResult& before) {

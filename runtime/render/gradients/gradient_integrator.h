@@ -6,6 +6,7 @@
 #include "runtime/render/gradients/gradient_film.h"
 #include "runtime/render/gradients/gradient_light_image.h"
 #include "runtime/render/integrators/guided_integrator.h"
+#include "runtime/render/integrators/path_integrator.h"
 #include "runtime/render/integrators/renderer.h"
 
 namespace lobe {
@@ -18,33 +19,25 @@ class GradientIntegrator {
   virtual GradientSample sample(int x, int y, Sampler& rng, PathStatistics& statistics) const = 0;
 };
 
-/// Scene and camera must outlive both classes. Of the options, counts is not used: Russian roulette is by throughput.
-class PathGradients : public GradientIntegrator {
+/// Gradient-domain path tracing. The guide (path_loop.h) samples the directions.
+template <class Guide>
+class PathGradientsOf : public GradientIntegrator {
  public:
-  PathGradients(const RenderScene& scene, const RayCamera& camera, const PathOptions& options)
-      : scene_(scene), camera_(camera), options_(options) {}
+  /// Scene and camera must outlive it. Of the options, counts is not used: Russian roulette is by throughput.
+  PathGradientsOf(const RenderScene& scene, const RayCamera& camera, const PathOptions& options, Guide guide = {})
+      : scene_(scene), camera_(camera), options_(options), guide_(guide) {}
   GradientSample sample(int x, int y, Sampler& rng, PathStatistics& statistics) const override;
 
  private:
   const RenderScene& scene_;
   const RayCamera& camera_;
   PathOptions options_;
+  Guide guide_;
 };
 
-class GuidedGradients : public GradientIntegrator {
- public:
-  /// The sampler must outlive it.
-  GuidedGradients(const RenderScene& scene, const RayCamera& camera, const PathOptions& options,
-                  const GuidedSampler& sampler)
-      : scene_(scene), camera_(camera), options_(options), sampler_(sampler) {}
-  GradientSample sample(int x, int y, Sampler& rng, PathStatistics& statistics) const override;
-
- private:
-  const RenderScene& scene_;
-  const RayCamera& camera_;
-  PathOptions options_;
-  const GuidedSampler& sampler_;
-};
+using PathGradients = PathGradientsOf<BsdfSampler>;
+/// The guide must outlive it.
+using GuidedGradients = PathGradientsOf<const GuidedSampler&>;
 
 /// Gradient-domain rendering with light paths, which contribute to any pixel.
 class BidirectionalGradientIntegrator {
@@ -57,11 +50,14 @@ class BidirectionalGradientIntegrator {
                                 GradientSplats splats) const = 0;
 };
 
-/// Scene and camera must outlive both classes. Of the options, counts is not used.
-class BdptGradients : public BidirectionalGradientIntegrator {
+/// Gradient-domain bidirectional path tracing. The guides sample the directions of camera paths and of light paths.
+template <class CameraGuide, class LightGuide>
+class BdptGradientsOf : public BidirectionalGradientIntegrator {
  public:
-  BdptGradients(const RenderScene& scene, const RayCamera& camera, const PathOptions& options)
-      : scene_(scene), camera_(camera), options_(options) {}
+  /// As for Bdpt.
+  BdptGradientsOf(const RenderScene& scene, const RayCamera& camera, const PathOptions& options,
+                  CameraGuide cameraGuide = {}, LightGuide lightGuide = {})
+      : scene_(scene), camera_(camera), options_(options), cameraGuide_(cameraGuide), lightGuide_(lightGuide) {}
   GradientSample sample(int x, int y, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
                         GradientSplats splats) const override;
 
@@ -69,24 +65,13 @@ class BdptGradients : public BidirectionalGradientIntegrator {
   const RenderScene& scene_;
   const RayCamera& camera_;
   PathOptions options_;
+  CameraGuide cameraGuide_;
+  LightGuide lightGuide_;
 };
 
-class GuidedBdptGradients : public BidirectionalGradientIntegrator {
- public:
-  /// camera and light: as for GuidedBdptIntegrator.
-  GuidedBdptGradients(const RenderScene& scene, const RayCamera& sensor, const PathOptions& options,
-                      const GuidedSampler& camera, const GuidedSampler& light)
-      : scene_(scene), camera_(sensor), options_(options), cameraGuide_(camera), lightGuide_(light) {}
-  GradientSample sample(int x, int y, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
-                        GradientSplats splats) const override;
-
- private:
-  const RenderScene& scene_;
-  const RayCamera& camera_;
-  PathOptions options_;
-  const GuidedSampler& cameraGuide_;
-  const GuidedSampler& lightGuide_;
-};
+using BdptGradients = BdptGradientsOf<BsdfSampler, BsdfSampler>;
+/// As for GuidedBdptIntegrator.
+using GuidedBdptGradients = BdptGradientsOf<const GuidedSampler&, const GuidedSampler&>;
 
 /// As render in renderer.h.
 RenderResult render(const RayCamera& camera, const GradientIntegrator& integrator, GradientFilm& film,

@@ -41,6 +41,9 @@ struct GradientContext {
   const PathOptions& options;
   const Guide& guide;
 };
+// clang 14, on which clang-tidy is based, does not deduce the arguments of aggregates.
+template <class Guide>
+GradientContext(const RenderScene&, const RayCamera&, const PathOptions&, const Guide&) -> GradientContext<Guide>;
 
 template <class Guide, class Weights>
 class ShiftedPath {

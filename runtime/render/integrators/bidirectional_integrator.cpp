@@ -6,18 +6,15 @@
 
 namespace lobe {
 
-Rgb BdptIntegrator::radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
-                             std::vector<Splat>& splats) const {
-  const BsdfSampler sampler;
-  return BidirectionalPaths(scene_, camera_, options_, sampler, sampler)
-      .radiance(ray, rng, lightRng, statistics, splats);
-}
-
-Rgb GuidedBdptIntegrator::radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
-                                   std::vector<Splat>& splats) const {
+template <class CameraGuide, class LightGuide>
+Rgb Bdpt<CameraGuide, LightGuide>::radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
+                                            std::vector<Splat>& splats) const {
   return BidirectionalPaths(scene_, camera_, options_, cameraGuide_, lightGuide_)
       .radiance(ray, rng, lightRng, statistics, splats);
 }
+
+template class Bdpt<BsdfSampler, BsdfSampler>;
+template class Bdpt<const GuidedSampler&, const GuidedSampler&>;
 
 Rgb GuidedLightIntegrator::radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
                                     std::vector<Splat>& splats) const {

@@ -7,11 +7,14 @@
 
 namespace lobe {
 
-class BdptIntegrator : public BidirectionalIntegrator {
+/// Bidirectional path tracing. The guides (path_loop.h) sample the directions of camera paths and of light paths.
+template <class CameraGuide, class LightGuide>
+class Bdpt : public BidirectionalIntegrator {
  public:
   /// Scene and camera must outlive it. Of the options, counts is not used: Russian roulette is by throughput.
-  BdptIntegrator(const RenderScene& scene, const RayCamera& camera, const PathOptions& options)
-      : scene_(scene), camera_(camera), options_(options) {}
+  Bdpt(const RenderScene& scene, const RayCamera& camera, const PathOptions& options, CameraGuide cameraGuide = {},
+       LightGuide lightGuide = {})
+      : scene_(scene), camera_(camera), options_(options), cameraGuide_(cameraGuide), lightGuide_(lightGuide) {}
   Rgb radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
                std::vector<Splat>& splats) const override;
 
@@ -19,25 +22,13 @@ class BdptIntegrator : public BidirectionalIntegrator {
   const RenderScene& scene_;
   const RayCamera& camera_;
   PathOptions options_;
+  CameraGuide cameraGuide_;
+  LightGuide lightGuide_;
 };
 
-class GuidedBdptIntegrator : public BidirectionalIntegrator {
- public:
-  /// As BdptIntegrator. camera: guides camera paths; light: guides light paths by the importance that arrives from the
-  /// camera. Both must outlive it.
-  GuidedBdptIntegrator(const RenderScene& scene, const RayCamera& sensor, const PathOptions& options,
-                       const GuidedSampler& camera, const GuidedSampler& light)
-      : scene_(scene), camera_(sensor), options_(options), cameraGuide_(camera), lightGuide_(light) {}
-  Rgb radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
-               std::vector<Splat>& splats) const override;
-
- private:
-  const RenderScene& scene_;
-  const RayCamera& camera_;
-  PathOptions options_;
-  const GuidedSampler& cameraGuide_;
-  const GuidedSampler& lightGuide_;
-};
+using BdptIntegrator = Bdpt<BsdfSampler, BsdfSampler>;
+/// Light paths are guided by the importance that arrives from the camera. The guides must outlive it.
+using GuidedBdptIntegrator = Bdpt<const GuidedSampler&, const GuidedSampler&>;
 
 /// Guided path tracing whose camera paths are combined with light paths (light_tracing.h).
 class GuidedLightIntegrator : public BidirectionalIntegrator {
