@@ -86,15 +86,17 @@ class GradientPath {
   void addEmission() {
     const Rgb radiance = emitted();
     if (!(radiance.maxCoeff() > 0.0f)) return;
-    const Contribution base(paths_.throughput * radiance, 1.0, 1.0 / misWeight(paths_.weights.base, paths_.hit));
+    const Contribution base(paths_.throughput * radiance, 1.0, total(paths_.weights.base, paths_.hit));
     result_.radiance += base.weighted();
     for (std::size_t i = 0; i < paths_.offsets.size(); ++i)
       result_.differences[i] +=
           weightedDifference(base, emissionOf(i), paths_.offsets[i].state != OffsetPath::State::apart);
   }
 
-  static float misWeight(const EmissionWeight& weight, const std::optional<SurfaceHit>& hit) {
-    return hit ? weight.ofSurface(*hit) : weight.ofEnvironment();
+  // The sum of the squared densities of both techniques relative to that of finding the emission. It may be very large
+  // for an offset path, whose weight is then that of the other technique.
+  static double total(const EmissionWeight& weight, const std::optional<SurfaceHit>& hit) {
+    return hit ? weight.inverseOfSurface(*hit) : weight.inverseOfEnvironment();
   }
 
   std::optional<Contribution> emissionOf(std::size_t i) const {
@@ -104,7 +106,7 @@ class GradientPath {
     const Vec3& direction = offset.state == OffsetPath::State::apart ? offset.direction : paths_.direction;
     const Rgb radiance = hit ? emittedRadiance(*hit) : scene_.lights.environmentRadiance(direction);
     const double own2 = squared(offset.ratio);
-    return Contribution(offset.throughput * radiance, own2, own2 / misWeight(paths_.weights.offsets[i], hit));
+    return Contribution(offset.throughput * radiance, own2, own2 * total(paths_.weights.offsets[i], hit));
   }
 
   // Returns false if the path ends.

@@ -114,8 +114,15 @@ class EmissionWeight {
   float ofSurface(const SurfaceHit& hit, float others = 0) const {
     return pdf_ > 0 && !bent_ ? misWeight(pdf_, nextEvent_.pdf(hit), others) : 1.0f / (1.0f + others);
   }
+  /// One over the weight, without other techniques, in double precision: finite where the weight is zero to rounding.
+  double inverseOfEnvironment() const { return pdf_ > 0 ? inverse(nextEvent_.environmentPdf(direction_)) : 1.0; }
+  double inverseOfSurface(const SurfaceHit& hit) const {
+    return pdf_ > 0 && !bent_ ? inverse(nextEvent_.pdf(hit)) : 1.0;
+  }
 
  private:
+  double inverse(double other) const { return 1.0 + (other / pdf_) * (other / pdf_); }
+
   LightSelection nextEvent_;
   Vec3 direction_ = Vec3::Zero();
   float pdf_ = 0;  // 0: next-event estimation does not find the emission
