@@ -102,7 +102,7 @@ MaterialReader::Made MaterialReader::make(pugi::xml_node node) {
     const Made& nested = done(child);
     parameters.addChild(nested.bsdf);
     children.push_back(nested.fingerprint);
-    parts += nested.parts;
+    parts = std::min(parts + nested.parts, kMostParts + 1);  // a file can have more than an int counts
     return true;
   };
   Parameters parameters = readParameters(context_, node, "texture, bsdf, ref", onChild);

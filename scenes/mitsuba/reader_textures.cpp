@@ -104,14 +104,17 @@ TexturePtr TextureReader::read(pugi::xml_node node, Encoded encoded) {
       const Nesting nesting(context_, node, depth_);
       done.texture = makeOf(node, encoded);
     };
-    if (!context_.attempt("grey is used", make)) done.texture = constantTexture(grey(kFallbackGrey));
+    if (!context_.attempt("grey is used", make)) {
+      done.texture = constantTexture(grey(kFallbackGrey));
+      parts_ = 1;
+    }
     done.parts = std::exchange(parts_, outer);
   } else if (!done.texture) {
     context_.unsupported(node, fmt::format("circle at {}", SceneFile::location(node)),
                          "a texture that refers to itself", "grey is used in it");
     return constantTexture(grey(kFallbackGrey));
   }
-  parts_ += done.parts;
+  parts_ = std::min(parts_ + done.parts, kMostParts + 1);  // a file can have more than an int counts
   return done.texture;
 }
 
