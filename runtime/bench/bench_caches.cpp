@@ -11,12 +11,14 @@
 
 #include <fmt/format.h>
 #include <tbb/global_control.h>
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "fitter/compile.h"
 #include "materials/lobes/roughness_levels.h"
 #include "materials/registry.h"
 #include "runtime/core/statistics.h"
+#include "runtime/tools/json_text.h"
 #include "runtime/tools/tool.h"
 #include "scenes/mitsuba/reader.h"
 #include "scenes/scene_lobes.h"
@@ -175,7 +177,7 @@ void runLevels(const Options& o) {
         rows.push_back(measureBetween(distribution, way, levels[i - 1], levels[i]));
     }
   }
-  fmt::print("{}\n", rows.dump(2));
+  fmt::print("{}\n", jsonText(rows));
 }
 
 void run(const Options& o) {
@@ -193,7 +195,7 @@ void run(const Options& o) {
       progress.advance();
     }
   }
-  fmt::print("{}\n", rows.dump(2));
+  fmt::print("{}\n", jsonText(rows));
 }
 
 void declare(CLI::App& app, Options& o) {

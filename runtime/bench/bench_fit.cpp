@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 #include <tbb/global_control.h>
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "fitter/compile.h"
@@ -18,6 +19,7 @@
 #include "materials/registry.h"
 #include "runtime/bench/automatic_fit.h"
 #include "runtime/core/statistics.h"
+#include "runtime/tools/json_text.h"
 #include "runtime/tools/tool.h"
 
 namespace {
@@ -208,7 +210,7 @@ void printJson(const std::vector<Row>& rows, const std::vector<WholeLobe>& lobes
                             {"directions", l.directions},
                             {"records", l.records},
                             {"milliseconds", l.milliseconds}});
-  fmt::print("{}\n", json.dump(2));
+  fmt::print("{}\n", jsonText(json));
 }
 
 void run(const Options& o) {

@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "runtime/analysis/incident_radiance.h"
@@ -18,6 +19,7 @@
 #include "runtime/core/statistics.h"
 #include "runtime/guiding/field_data.h"
 #include "runtime/guiding/sample_storage_data.h"
+#include "runtime/tools/json_text.h"
 
 namespace {
 
@@ -168,7 +170,7 @@ void run(Options& o) {
   progress.advance();
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
   for (const Trained& trained : trainings) rows.push_back(row(heldOut, trained));
-  fmt::print("{}\n", rows.dump(2));
+  fmt::print("{}\n", jsonText(rows));
 }
 
 void declare(CLI::App& app, Options& o) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "fitter/compile.h"
@@ -19,6 +20,7 @@
 #include "runtime/core/statistics.h"
 #include "runtime/mixture/disc.h"
 #include "runtime/mixture/lookup.h"
+#include "runtime/tools/json_text.h"
 #include "runtime/tools/tool.h"
 
 namespace {
@@ -197,6 +199,6 @@ int main(int argc, char** argv) {
       },
       [&] {
         fmt::print("{}\n",
-                   Json{{"slices", slices()}, {"alignment", alignment(counts)}, {"reduction", reduction()}}.dump(1));
+                   jsonText({{"slices", slices()}, {"alignment", alignment(counts)}, {"reduction", reduction()}}, 1));
       });
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "runtime/bench/eager_product.h"
@@ -18,6 +19,7 @@
 #include "runtime/guiding/reflectance.h"
 #include "runtime/render/film/camera.h"
 #include "runtime/render/geometry/raytracer.h"
+#include "runtime/tools/json_text.h"
 #include "runtime/tools/tool.h"
 #include "scenes/mitsuba/reader.h"
 
@@ -271,7 +273,7 @@ void run(const Options& o) {
     for (const int one : {1, 2, 3, 4, 5, 8}) rows.push_back(row(one, two, lights, rays, o));
   }
   const std::string used = o.target.empty() ? kernelTargetName(kernelTargets().front()) : o.target;
-  fmt::print("{}\n", nlohmann::ordered_json{{"target", used}, {"rows", rows}}.dump(2));
+  fmt::print("{}\n", jsonText({{"target", used}, {"rows", rows}}));
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "runtime/analysis/incident_radiance.h"
@@ -20,6 +21,7 @@
 #include "runtime/core/sampling.h"
 #include "runtime/core/statistics.h"
 #include "runtime/guiding/field_data.h"
+#include "runtime/tools/json_text.h"
 
 namespace {
 
@@ -341,7 +343,7 @@ void run(Options& o) {
   const GuidedIntegrator paths(renderScene, {}, product);
   const std::vector<SurfaceHit> vertices = verticesOfPaths(renderScene, camera, product, o.vertices);
   const Bench bench{renderScene, paths, guided, product, fixedFractions, o};
-  fmt::print("{}\n", report(gradeAll(bench, reductions, vertices), reductions).dump(2));
+  fmt::print("{}\n", jsonText(report(gradeAll(bench, reductions, vertices), reductions)));
 }
 
 void declare(CLI::App& app, Options& o) {

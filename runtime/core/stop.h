@@ -1,12 +1,10 @@
 #pragma once
 // Interruption of long work from outside, for example by a signal.
 
-#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <exception>
 #include <mutex>
-#include <stdexcept>
 #include <stop_token>
 #include <thread>
 #include <utility>
@@ -14,17 +12,9 @@
 #include <tbb/task_group.h>
 
 #include "runtime/core/parallel.h"
+#include "runtime/core/stop_flag.h"
 
 namespace lobe {
-
-/// Set to a value other than 0, from a signal handler or another thread, to end long work early.
-using StopFlag = std::atomic<int>;
-
-/// Thrown by work that has ended early because of a StopFlag. The message says what was done and what was not.
-class Stopped : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 /// Cancels the parallel loops of a task group soon after the flag is set.
 class CancelOnStop {

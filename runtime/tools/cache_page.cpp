@@ -64,7 +64,7 @@ std::string page(const char* kind, const Json& files) {
                   {"sequential", colours(sequentialColour, 0, 1)},
                   {"diverging", colours(divergingColour, -1, 1)},
                   {"files", files}};
-  std::string json = data.dump(-1, ' ', false, Json::error_handler_t::replace);
+  std::string json = jsonText(data, -1);
   // In a script element, "</" would end it.
   for (std::size_t at = 0; (at = json.find("</", at)) != std::string::npos; at += 3) json.replace(at, 2, "<\\/");
   std::string text = kCachePage;

@@ -3,14 +3,12 @@
 
 #include <string>
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 namespace lobe {
 
-/// Indented text in UTF-8. Bytes of names that are invalid UTF-8, which file names and damaged files may contain, are
-/// replaced by U+FFFD.
-inline std::string jsonText(const nlohmann::ordered_json& json) {
-  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
-}
+/// Text in UTF-8, indented by that many characters a level; −1: in one line. Bytes of names that are invalid UTF-8,
+/// which file names and damaged files may contain, are replaced by U+FFFD.
+std::string jsonText(const nlohmann::ordered_json& json, int indent = 2);
 
 }  // namespace lobe

@@ -2,6 +2,7 @@
 // tables, JSON, plots, interactive pages, point clouds or differences.
 
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "fitter/compile.h"

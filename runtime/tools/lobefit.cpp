@@ -9,10 +9,12 @@
 
 #include <fmt/format.h>
 #include <tbb/global_control.h>
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "fitter/compile.h"
 #include "runtime/core/parallel.h"
+#include "runtime/core/stop.h"
 #include "runtime/tools/cache_report.h"
 #include "runtime/tools/check_report.h"
 #include "runtime/tools/json_text.h"

@@ -7,9 +7,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <oneapi/tbb/global_control.h>
+#include <CLI/CLI.hpp>
 
 #include "runtime/tools/check_report.h"
 #include "runtime/tools/exr_options.h"
+#include "runtime/tools/option_names.h"
 #include "runtime/tools/render_run.h"
 #include "runtime/tools/tool.h"
 

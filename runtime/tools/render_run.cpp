@@ -17,6 +17,7 @@
 
 #include "runtime/analysis/record_view.h"
 #include "runtime/core/atomic_file.h"
+#include "runtime/core/stop.h"
 #include "runtime/core/stopwatch.h"
 #include "runtime/image/image_output.h"
 #include "runtime/render/integrators/features.h"

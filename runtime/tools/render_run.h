@@ -1,7 +1,7 @@
 #pragma once
 // A run of loberender, from the options to the output files.
 
-#include "runtime/core/stop.h"
+#include "runtime/core/stop_flag.h"
 #include "runtime/tools/render_job.h"
 
 namespace lobe {

@@ -13,11 +13,11 @@
 #include <string_view>
 #include <vector>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-#include <CLI/CLI.hpp>
+#include "runtime/core/stop_flag.h"
 
-#include "runtime/core/stop.h"
+namespace CLI {
+class App;
+}
 
 namespace lobe {
 
@@ -65,25 +65,6 @@ void addDefinitions(CLI::App& app, std::map<std::string, std::string>& definitio
 
 /// Adds the option --threads N with N ≥ 1; threads keeps its value (0: all cores) if the option is not given.
 void addThreads(CLI::App& app, int& threads);
-
-/// A validator of CLI11 that accepts one of the names and replaces it by its value; names: pairs of a name and an
-/// enumerator.
-template <class Names>
-CLI::Validator oneOf(const Names& names) {
-  std::map<std::string, std::string> values;
-  std::vector<std::string> all;
-  for (const auto& [name, value] : names) {
-    values[name] = std::to_string(static_cast<int>(value));
-    all.push_back(name);
-  }
-  const auto replace = [values, all](std::string& text) {
-    const auto found = values.find(text);
-    if (found == values.end()) return fmt::format("must be one of {}, not '{}'", fmt::join(all, ", "), text);
-    text = found->second;
-    return std::string();
-  };
-  return {replace, fmt::format("{{{}}}", fmt::join(all, ","))};
-}
 
 /// Shows the progress of long work on stderr. On a terminal, one line with the remaining time is redrawn up to five
 /// times per second; otherwise a new line is printed every ten seconds, and nothing for shorter work. advance may be

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 #include <tbb/task.h>
-#include <nlohmann/json.hpp>
+#include <CLI/CLI.hpp>
 
 #include "fitter/compile.h"
 #include "runtime/core/atomic_file.h"
@@ -16,6 +16,7 @@
 #include "runtime/tools/tool.h"
 #include "scenes/scene_lobes.h"
 #include "tests/support/fitter_test_lobes.h"
+#include "tests/support/json.h"
 #include "tests/support/tool_run.h"
 
 using namespace lobe;
@@ -167,7 +168,7 @@ TEST_CASE("fitter: lobefit compiles a scene once and lobedump shows the caches")
   ToolRun r = runBinary(folder.path(), fit + " --json");
   CHECK(r.code == 0);
   CHECK_THAT(r.error, Catch::Contains("1 of 1 lobes written to lobes"));
-  const auto json = nlohmann::json::parse(r.out);
+  const auto json = parseJson(r.out);
   REQUIRE(json.size() == 1);
   CHECK(json[0]["materials"] == nlohmann::json({"Steel", "Again"}));
   CHECK(json[0]["records"] == 4);
@@ -180,7 +181,7 @@ TEST_CASE("fitter: lobefit compiles a scene once and lobedump shows the caches")
   CHECK(r.code == 0);
   CHECK(lineCount(r.out) == 6 + 5 + 1 + 2);  // header, records, gap, table
   r = runBinary(folder.path(), "lobedump --json lobes/*.lobe");
-  CHECK(nlohmann::json::parse(r.out)[0]["records"].size() == 4);
+  CHECK(parseJson(r.out)[0]["records"].size() == 4);
 }
 
 TEST_CASE("fitter: if one lobe fails the caches of the others are complete") {

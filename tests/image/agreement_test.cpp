@@ -5,13 +5,13 @@
 #include <numbers>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "runtime/core/random.h"
 #include "runtime/image/agreement.h"
 #include "runtime/image/image_output.h"
 #include "runtime/image/merge.h"
-#include "tests/support/render_test_tools.h"
+#include "tests/support/json.h"
+#include "tests/support/tool_run.h"
 
 using namespace lobe;
 using namespace lobe::test;
@@ -123,7 +123,7 @@ TEST_CASE("agreement: lobecompare writes the variance of merged pictures and tes
   SECTION("agreement") {
     const ToolRun run = lobecompare("--json " + a + "--agree-with " + b);
     REQUIRE(run.code == 0);
-    const auto json = nlohmann::json::parse(run.out);
+    const auto json = parseJson(run.out);
     CHECK(json["agree"] == true);
     CHECK(json["blocks"] == 30);
     CHECK_THAT(lobecompare(a + "--agree-with " + b).out, Catch::StartsWith("agree: ratio of means"));

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include "runtime/core/sampler.h"
 #include "runtime/image/merge.h"
-#include "tests/support/render_test_tools.h"
+#include "tests/support/moments.h"
+#include "tests/support/tool_run.h"
 
 using namespace lobe;
 using namespace lobe::test;

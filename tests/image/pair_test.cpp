@@ -4,13 +4,12 @@
 #include <limits>
 #include <numbers>
 
-#include <nlohmann/json.hpp>
-
 #include "runtime/core/random.h"
 #include "runtime/image/error_map.h"
 #include "runtime/image/image_output.h"
 #include "runtime/image/pair_variance.h"
-#include "tests/support/render_test_tools.h"
+#include "tests/support/json.h"
+#include "tests/support/tool_run.h"
 
 using namespace lobe;
 using namespace lobe::test;
@@ -149,7 +148,7 @@ TEST_CASE("pair: lobecompare --pair prints text and JSON and a map") {
   SECTION("results") {
     const ToolRun run = lobecompare("--pair --json " + a + " " + b + " --map " + map);
     REQUIRE(run.code == 0);
-    const auto json = nlohmann::json::parse(run.out);
+    const auto json = parseJson(run.out);
     const PairVariance v = comparePair(readImage(a), readImage(b));
     CHECK(json["images"] == nlohmann::json::array({a, b}));
     CHECK(json["relvar"].get<double>() == v.all.value);

@@ -1,5 +1,6 @@
 // Polygons, groups and smoothing of meshes in files of all formats.
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 
 #include <chrono>
@@ -28,10 +29,17 @@ double areaOf(const TriangleMesh& mesh) {
   return area;
 }
 
+// Code with sanitizers is many times slower.
+#if defined(LOBE_SANITIZED)
+constexpr bool kSanitized = true;
+#else
+constexpr bool kSanitized = false;
+#endif
+
 using Polygon = std::vector<Vec2>;
 
 Polygon startingAt(Polygon corners, std::size_t first) {
-  std::ranges::rotate(corners, corners.begin() + static_cast<std::ptrdiff_t>(first));
+  std::rotate(corners.begin(), corners.begin() + static_cast<std::ptrdiff_t>(first), corners.end());
   return corners;
 }
 
@@ -125,7 +133,8 @@ TEST_CASE("scenes: triangulating a polygon with many corners takes at most quadr
   comb.emplace_back(0, 2, 0);
   const auto start = std::chrono::steady_clock::now();
   const auto triangles = triangulate(comb);
-  CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(5));
+  const std::chrono::duration<double> time = std::chrono::steady_clock::now() - start;
+  if (!kSanitized) CHECK(time.count() < 5);
   double area = 0;
   for (const auto& [i, j, k] : triangles) area += 0.5 * (comb[j] - comb[i]).cross(comb[k] - comb[i]).z();
   double expected = 0;  // by the shoelace formula

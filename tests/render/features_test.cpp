@@ -2,6 +2,9 @@
 // accumulation over samples.
 
 #include "runtime/render/integrators/features.h"
+
+#include <limits>
+
 #include "materials/lobes/fresnel.h"
 #include "materials/registry.h"
 #include "tests/support/render_test_tools.h"
@@ -227,4 +230,20 @@ TEST_CASE("features: the variance of a pixel is that among pictures with other s
   // 16 sums of 400 squares: the standard error of the ratio is about 2 %.
   CHECK(std::abs(ratio(PixelSampling::independent) - 1) < 0.1);
   CHECK(ratio(PixelSampling::sobol) > 1);
+}
+
+TEST_CASE("render: a film drops and counts samples that are negative or not finite") {
+  Film film(2, 1);
+  film.add(0, 0, {1, 2, 3});
+  film.add(0, 0, {std::numeric_limits<float>::quiet_NaN(), 0, 0});
+  film.add(0, 0, {0, kInfinity, 0});
+  film.add(0, 0, {0, 0, -1e-9f});
+  film.add(0, 0, {3, 2, 1});
+  CHECK(film.dropped() == 3);
+  const Image mean = film.mean();
+  CHECK((mean.at(0, 0) - Rgb(2, 2, 2)).abs().maxCoeff() < 1e-7f);
+  CHECK(mean.at(1, 0).isZero());
+  const Image variance = film.varianceOfMean();
+  CHECK((variance.at(0, 0) - Rgb(1, 0, 1)).abs().maxCoeff() < 1e-7f);
+  CHECK(variance.at(1, 0).x() == 0);
 }

@@ -10,6 +10,7 @@
 
 #include "runtime/core/sampling.h"
 #include "runtime/render/integrators/path_integrator.h"
+#include "tests/support/moments.h"
 #include "tests/support/tool_run.h"
 
 namespace lobe::test {
@@ -108,33 +109,6 @@ inline void addEmitter(Scene& scene, Geometry geometry, float radiance, int mate
 inline Environment environment(Image image) {
   return {std::move(image), Eigen::Matrix3f::Identity()};
 }
-
-/// Running mean and standard error.
-class Moments {
- public:
-  void add(double x) {
-    ++n_;
-    const double d = x - mean_;
-    mean_ += d / n_;
-    squares_ += d * (x - mean_);
-  }
-  double mean() const { return mean_; }
-  double error() const { return std::sqrt(std::max(0.0, squares_) / (n_ - 1.0) / n_); }
-
- private:
-  double n_ = 0, mean_ = 0, squares_ = 0;
-};
-
-/// Distance of the mean from the truth in standard errors; a relative error of 10⁻⁵ is allowed for rounding.
-inline double deviation(const Moments& m, double truth) {
-  return std::abs(m.mean() - truth) / std::hypot(m.error(), 1e-5 * truth);
-}
-/// The same for two estimates of the same quantity.
-inline double deviation(const Moments& a, const Moments& b) {
-  return std::abs(a.mean() - b.mean()) / std::hypot(a.error(), b.error(), 1e-5 * a.mean());
-}
-/// Exceeded by chance with probability 1/15 000.
-inline constexpr double kMaxDeviation = 4.0;
 
 /// The green channel of n radiance estimates along one ray.
 inline Moments estimate(const Integrator& integrator, const Ray& ray, int n, std::uint64_t seed = 7) {

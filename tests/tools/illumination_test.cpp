@@ -1,10 +1,10 @@
 // Illumination files: train once, then render elsewhere or in parts.
 
 #include <catch2/catch.hpp>
-#include <nlohmann/json.hpp>
 
 #include "runtime/image/image.h"
 #include "runtime/image/image_output.h"
+#include "tests/support/json.h"
 #include "tests/support/loberender_test_tools.h"
 
 using namespace lobe;
@@ -26,7 +26,7 @@ TEST_CASE("loberender: rendering with saved illumination reproduces the image") 
     CAPTURE(restored.error);
     REQUIRE(restored.code == 0);
     CHECK(folder.bytes("again.exr") == folder.bytes("trained.exr"));
-    const auto s = nlohmann::json::parse(folder.bytes("s.json"));
+    const auto s = parseJson(folder.bytes("s.json"));
     CHECK((s.at("seconds_training") == 0 && s.at("training_passes").empty() && s.at("records") > 0));
 
     REQUIRE(folder.run(kSave + integrator + " --threads 1").code == 0);
@@ -103,7 +103,7 @@ TEST_CASE("loberender: training goes on from stored illumination, which the new 
   folder.write("other.xml", camera);
   REQUIRE(folder.run(kSave).code == 0);
   const auto recordsOf = [&](const std::string& stats) {
-    return nlohmann::json::parse(folder.bytes(stats)).at("records").get<int>();
+    return parseJson(folder.bytes(stats)).at("records").get<int>();
   };
   const std::string use = "loberender scene.xml --camera other.xml --spp 2 --illumination a.illum";
   REQUIRE(folder.run(use + " -o plain.exr --stats plain.json").code == 0);
@@ -225,7 +225,7 @@ TEST_CASE("lobedump: shows illumination as text and JSON and as a point cloud") 
   CHECK_THAT(text.out,
              Catch::Contains("/scene.xml, hash") && Catch::Contains("from both, 1 passes of 2000 photons and 1000") &&
                  Catch::Contains("radius") && Catch::Contains("undersampled") && Catch::Contains("learnt fractions"));
-  const auto json = nlohmann::json::parse(folder.run("lobedump --json a.illum").out).at(0);
+  const auto json = parseJson(folder.run("lobedump --json a.illum").out).at(0);
   const long records = json.at("record_count");
   REQUIRE(records > 1);
   CHECK(json.at("bytes") == folder.bytes("a.illum").size());
@@ -235,7 +235,7 @@ TEST_CASE("lobedump: shows illumination as text and JSON and as a point cloud") 
   CHECK_FALSE(json.contains("records"));
   const auto& radius = json.at("distributions").at("radius");
   CHECK((radius.at("min") > 0 && radius.at("min") <= radius.at("median") && radius.at("max") <= json.at("unit")));
-  const auto all = nlohmann::json::parse(folder.run("lobedump --json --records a.illum").out).at(0);
+  const auto all = parseJson(folder.run("lobedump --json --records a.illum").out).at(0);
   CHECK(static_cast<long>(all.at("records").size()) == records);
   CHECK(lineCount(folder.run("lobedump --records a.illum").out) == lineCount(text.out) + records + 1);
 

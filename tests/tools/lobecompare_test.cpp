@@ -4,10 +4,10 @@
 #include <string>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "runtime/image/image_output.h"
-#include "tests/support/render_test_tools.h"
+#include "tests/support/json.h"
+#include "tests/support/tool_run.h"
 
 using namespace lobe;
 using namespace lobe::test;
@@ -28,7 +28,7 @@ TEST_CASE("render: lobecompare prints error metrics as text and JSON") {
   SECTION("numbers") {
     const ToolRun run = lobecompare(reference + " " + image + " " + reference + " --json");
     REQUIRE(run.code == 0);
-    const auto json = nlohmann::json::parse(run.out);
+    const auto json = parseJson(run.out);
     REQUIRE(json.size() == 2);
     CHECK(json[0]["image"] == image);
     CHECK(json[0]["mse"].get<double>() == Approx(0.01));
@@ -63,7 +63,7 @@ TEST_CASE("render: lobecompare prints error metrics as text and JSON") {
     writeImage(large, pixels);
     const ToolRun run = lobecompare(large + " " + image + " --shrink 2 --json");
     REQUIRE(run.code == 0);
-    CHECK(nlohmann::json::parse(run.out)[0]["mse"].get<double>() == Approx(0.01));
+    CHECK(parseJson(run.out)[0]["mse"].get<double>() == Approx(0.01));
     const ToolRun uneven = lobecompare(large + " " + image + " --shrink 3");
     CHECK(uneven.code == 1);
     CHECK(uneven.error ==

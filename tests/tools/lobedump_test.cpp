@@ -4,8 +4,6 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include <nlohmann/json.hpp>
-
 #include "fitter/disc_mass.h"
 #include "fitter/lobe_fit.h"
 #include "runtime/analysis/colour_map.h"
@@ -16,6 +14,7 @@
 #include "runtime/tools/cache_diff.h"
 #include "runtime/tools/cache_plot.h"
 #include "tests/support/fitter_test_lobes.h"
+#include "tests/support/json.h"
 #include "tests/support/tool_run.h"
 
 using namespace lobe;
@@ -317,13 +316,13 @@ TEST_CASE("fitter: lobedump --diff lists differences and returns exit codes like
 TEST_CASE("fitter: lobedump --diff --json counts and matches records") {
   const Caches folder;
   const auto diff = [&](const std::string& files) {
-    return nlohmann::json::parse(folder.run("lobedump --diff --json " + files).out);
+    return parseJson(folder.run("lobedump --diff --json " + files).out);
   };
   const auto same = diff("good.lobe good.lobe"), poor = diff("good.lobe poor.lobe"), back = diff("poor.lobe good.lobe");
   CHECK((same["equal"] == true && same["fields"].empty() && same["alike"] == 8));
   CHECK(same["records"][3]["same"] == true);
   CHECK((poor["equal"] == false && poor["same_lobe"] == true && poor["same_grid"] == true));
-  CHECK(poor["fields"] == nlohmann::json::parse(R"([{"name": "settings.components", "a": "8", "b": "2"}])"));
+  CHECK(poor["fields"] == parseJson(R"([{"name": "settings.components", "a": "8", "b": "2"}])"));
   CHECK(poor["worse"] > poor["better"]);
   CHECK((poor["worse"] == back["better"] && poor["better"] == back["worse"]));
   CHECK(poor["a"]["summary"]["nev_median"] < poor["b"]["summary"]["nev_median"]);
@@ -340,7 +339,7 @@ TEST_CASE("fitter: lobedump --diff --json counts and matches records") {
 
 TEST_CASE("fitter: lobedump shows all quantities of a record") {
   const Caches folder;
-  const auto json = nlohmann::json::parse(folder.run("lobedump --json good.lobe").out)[0];
+  const auto json = parseJson(folder.run("lobedump --json good.lobe").out)[0];
   const LobeCache cache = LobeCache::open(folder / "good.lobe");
   const CacheRecord& r = cache.records()[5];
   const auto& shown = json["records"][5];
@@ -361,7 +360,7 @@ TEST_CASE("fitter: lobedump shows no grades for a lobe without components") {
   record.integral = record.albedo = 0.9f;
   writeAtomically(folder / "mirror.lobe",
                   encodeLobeCache(info, std::vector{record}, {}, std::vector<std::uint32_t>{0, 0}));
-  const auto json = nlohmann::json::parse(folder.run("lobedump --json mirror.lobe").out)[0];
+  const auto json = parseJson(folder.run("lobedump --json mirror.lobe").out)[0];
   CHECK((json["summary"]["nev_median"].is_null() && json["summary"]["mean_components"] == 0));
   CHECK((json["records"][0]["nev"].is_null() && json["records"][0]["worst_ratio"].is_null()));
   CHECK(json["records"][0]["albedo"].get<float>() == 0.9f);
@@ -370,6 +369,6 @@ TEST_CASE("fitter: lobedump shows no grades for a lobe without components") {
   CHECK_THAT(table, !Catch::Contains("0.000"));
   const ToolRun plot = folder.run("lobedump --plot x.png mirror.lobe");
   CHECK((plot.code == 1 && plot.error.find("no fit to draw") != std::string::npos));
-  const auto diff = nlohmann::json::parse(folder.run("lobedump --diff --json mirror.lobe good.lobe").out);
+  const auto diff = parseJson(folder.run("lobedump --diff --json mirror.lobe good.lobe").out);
   CHECK((diff["better"] == 0 && diff["worse"] == 0 && diff["alike"] == 0));
 }

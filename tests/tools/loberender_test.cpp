@@ -11,10 +11,10 @@
 #include <ImfStringAttribute.h>
 #include <fmt/format.h>
 #include <catch2/catch.hpp>
-#include <nlohmann/json.hpp>
 
 #include "runtime/image/image_output.h"
 #include "schema/lobe_cache.h"
+#include "tests/support/json.h"
 #include "tests/support/loberender_test_tools.h"
 
 using namespace lobe;
@@ -243,7 +243,7 @@ TEST_CASE("loberender: bidirectional pictures do not depend on the number of thr
     REQUIRE(folder.run(fmt::format("{0} --threads {1} -o {1}.exr --stats s.json", render, threads)).code == 0);
   CHECK(folder.bytes("1.exr") == folder.bytes("2.exr"));
   CHECK(folder.bytes("1.exr") == folder.bytes("7.exr"));
-  const auto s = nlohmann::json::parse(folder.bytes("s.json"));
+  const auto s = parseJson(folder.bytes("s.json"));
   CHECK(s.at("integrator") == "bdpt");
   CHECK((s.at("records") > 0) == (guide != "none"));
   CHECK(s.at("nonfinite_samples") == 0);
@@ -276,7 +276,7 @@ TEST_CASE("loberender: pictures with light paths do not depend on the number of 
     REQUIRE(folder.run(fmt::format("{0} --spp 4 --stats s.json --threads {1} -o {1}.exr", render, threads)).code == 0);
   CHECK(folder.bytes("1.exr") == folder.bytes("2.exr"));
   CHECK(folder.bytes("1.exr") == folder.bytes("7.exr"));
-  const auto s = nlohmann::json::parse(folder.bytes("s.json"));
+  const auto s = parseJson(folder.bytes("s.json"));
   CHECK(s.at("integrator") == integrator);
   CHECK(s.at("light_paths").at("used") == true);
   CHECK(s.at("light_paths").at("paths_per_pixel") > 0);
@@ -316,7 +316,7 @@ TEST_CASE("loberender: pictures say how much light --firefly-limit has cut off, 
   REQUIRE(folder.run(limited + " --spp 4 -o whole.exr --stats s.json").code == 0);
   CHECK(std::get<double>(readAttributes(folder / "whole.exr").at("fireflyLimit")) == Approx(0.05));
   CHECK(cutOf("whole.exr") > 0.01);
-  CHECK(nlohmann::json::parse(folder.bytes("s.json")).at("firefly_cut_fraction") == cutOf("whole.exr"));
+  CHECK(parseJson(folder.bytes("s.json")).at("firefly_cut_fraction") == cutOf("whole.exr"));
   // The filter spreads light paths over the border of the picture.
   CHECK(sumOf("whole.exr") / (1 - cutOf("whole.exr")) ==
         Approx(sumOf("plain.exr")).epsilon(integrator == "path" ? 1e-4 : 0.02));
@@ -361,7 +361,7 @@ TEST_CASE("loberender: statistics and convergence and images of a run") {
     CHECK(folder.names() == expected);
   }
   SECTION("statistics") {
-    const auto s = nlohmann::json::parse(folder.bytes("s.json"));
+    const auto s = parseJson(folder.bytes("s.json"));
     const double training = s.at("seconds_training"), rendering = s.at("seconds_rendering");
     const double path = s.at("pilot").at("path").at("variance"), product = s.at("pilot").at("product").at("variance");
     const double pathCost = s.at("pilot").at("path").at("cost"), productCost = s.at("pilot").at("product").at("cost");

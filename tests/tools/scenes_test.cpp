@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 #include <catch2/catch.hpp>
-#include <nlohmann/json.hpp>
 
 #include "runtime/image/image.h"
+#include "tests/support/json.h"
 #include "tests/support/loberender_test_tools.h"
 
 namespace lobe::test {
@@ -108,7 +108,7 @@ TEST_CASE("loberender and lobefit: --check reports all faults and renders nothin
   CHECK(run.error == "loberender: error: scene.xml: 2 faults\n");
   run = folder.run("loberender --check scene.xml --json");
   CHECK(run.code == 1);
-  const auto json = nlohmann::json::parse(run.out);
+  const auto json = parseJson(run.out);
   CHECK(json["readable"] == false);
   CHECK(json["faults"].size() == 2);
   CHECK(json["faults"][0]["with_lenient"] == "the shape is left out");
@@ -119,7 +119,7 @@ TEST_CASE("loberender and lobefit: --check reports all faults and renders nothin
   CHECK(run.code == 1);
   run = folder.run("lobefit --check --lenient scene.xml --json");
   CHECK(run.code == 0);
-  CHECK(nlohmann::json::parse(run.out)["readable"] == true);
+  CHECK(parseJson(run.out)["readable"] == true);
   CHECK(folder.names() == std::set<std::string>{"scene.xml"});
 }
 

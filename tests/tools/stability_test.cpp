@@ -15,10 +15,10 @@
 
 #include <fmt/format.h>
 #include <catch2/catch.hpp>
-#include <nlohmann/json.hpp>
 
 #include "runtime/image/image.h"
 #include "runtime/image/image_output.h"
+#include "tests/support/json.h"
 #include "tests/support/loberender_test_tools.h"
 
 using namespace lobe;
@@ -158,7 +158,7 @@ TEST_CASE("loberender: outputs beyond the file size limit are errors, and leave 
     CHECK_THAT(errors, Contains(std::string("loberender: error: ") + name + ": cannot write: File too large"));
     CHECK_FALSE(folder.has(name));
   }
-  CHECK(nlohmann::json::parse(folder.bytes("s.json"))["spp"] == 1);
+  CHECK(parseJson(folder.bytes("s.json"))["spp"] == 1);
   CHECK(hiddenFiles(folder.path()) == 0);
 }
 
@@ -175,7 +175,7 @@ TEST_CASE("tools: names of any length and any bytes") {
   fs::copy(folder / "a.exr", folder / odd);
   const ToolRun compare = folder.run("lobecompare a.exr " + odd + " --json");
   CHECK(compare.code == 0);
-  CHECK(nlohmann::json::parse(compare.out)[0]["image"] == "b\xef\xbf\xbd.exr");
+  CHECK(parseJson(compare.out)[0]["image"] == "b\xef\xbf\xbd.exr");
 }
 
 TEST_CASE("tools: a pipe as an input is an error and does not block") {
@@ -234,7 +234,7 @@ TEST_CASE("loberender: an interrupted render writes the picture so far") {
                    Contains(" of 1000000000 samples per pixel are rendered and written; --resume run.ckpt"));
     CHECK(readImage(folder / "a.exr").width == 16);
     CHECK(readImage(folder / "b.png").width == 16);
-    CHECK(nlohmann::json::parse(folder.bytes("s.json"))["spp"] > 0);
+    CHECK(parseJson(folder.bytes("s.json"))["spp"] > 0);
     const ImageAttributes attributes = attributesOf(folder, "a.exr");
     CHECK(attributes.contains("samples") != attributes.contains("interrupted"));
     CHECK(hiddenFiles(folder.path()) == 0);
@@ -291,8 +291,7 @@ TEST_CASE("loberender: a resumed render has the bytes of an uninterrupted one") 
     REQUIRE(resumed.code == 0);
     CHECK_THAT(resumed.error, Contains("run.ckpt: continues with sample 3 of each pixel"));
     CHECK(folder.bytes("part.exr") == folder.bytes("whole.exr"));
-    const auto whole = nlohmann::json::parse(folder.bytes("whole.json")),
-               part = nlohmann::json::parse(folder.bytes("part.json"));
+    const auto whole = parseJson(folder.bytes("whole.json")), part = parseJson(folder.bytes("part.json"));
     for (const char* key : {"rays", "spp", "training_particles", "records", "strategy_fractions", "guiding_decisions",
                             "largest_contributions", "firefly_cut_fraction"})
       CHECK(whole[key] == part[key]);
@@ -308,8 +307,7 @@ TEST_CASE("loberender: a resumed timed run keeps its choice of the integrator an
     const std::string render = fmt::format("loberender scene.xml --integrator {}{} -o a.exr", integrator, kTraining);
     REQUIRE(folder.run(render + " --seconds 0.5 --stats part.json --checkpoint run.ckpt").code == 0);
     REQUIRE(folder.run(render + " --seconds 1 --stats whole.json --resume run.ckpt").code == 0);
-    const auto part = nlohmann::json::parse(folder.bytes("part.json")),
-               whole = nlohmann::json::parse(folder.bytes("whole.json"));
+    const auto part = parseJson(folder.bytes("part.json")), whole = parseJson(folder.bytes("whole.json"));
     CHECK(part[key].is_object());
     CHECK(part[key] == whole[key]);  // with its time, which differs if the comparison is repeated
   }

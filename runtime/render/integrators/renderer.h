@@ -5,7 +5,7 @@
 #include <functional>
 #include <optional>
 
-#include "runtime/core/stop.h"
+#include "runtime/core/stop_flag.h"
 #include "runtime/render/film/camera.h"
 #include "runtime/render/film/film.h"
 #include "runtime/render/integrators/integrator.h"
