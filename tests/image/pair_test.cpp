@@ -25,7 +25,7 @@ float normal(Rng& rng) {
 
 /// Grey pixels with normal noise, the same in tiles of this size, which start at (−3, −2).
 Image noisy(int size, int tile, Rng& rng) {
-  const int tiles = size / tile + 2;
+  const int tiles = (size + 2) / tile + 1;
   std::vector<float> values(static_cast<std::size_t>(tiles) * tiles);
   for (float& v : values) v = kMean + kDeviation * normal(rng);
   Image image(size, size);
