@@ -21,7 +21,7 @@ namespace {
 // after 21 seconds.
 constexpr double kTrainingFraction = 0.15;
 
-/// Fraction of --seconds after which automatic compares path and product for the first time.
+/// Fraction of --seconds after which automatic compares path and product.
 constexpr double kTrialFraction = 0.03;
 
 /// Whether automatic compares path and product during training. With limits that are given, or if the illumination is
@@ -98,9 +98,9 @@ Pilot runPilot(const RenderJob& job, const RayCamera& camera, const Integrator& 
   return {results[0], results[1], watch.seconds()};
 }
 
-/// Compares path and product with what has been learnt so far in training, and sets guiding.pilot.
-void runPilotEarly(const RenderJob& job, const RenderScene& scene, const RayCamera& camera, const Field& field,
-                   Guiding& guiding) {
+/// Compares path and product with what has been learnt so far in training.
+Pilot runPilotEarly(const RenderJob& job, const RenderScene& scene, const RayCamera& camera, const Field& field,
+                    const Guiding& guiding) {
   constexpr double kCountsSize = 0.25;
   const Stopwatch watch;
   const GuidedSampler sampler(scene.scene, field, guiding.cachesOrNull());
@@ -111,23 +111,22 @@ void runPilotEarly(const RenderJob& job, const RenderScene& scene, const RayCame
     counts = learnCounts(job, scene, camera, options, sampler, field.records(), kCountsSize * preparationSize(job));
     options.counts = &*counts;
   }
-  const double earlier = guiding.pilot ? guiding.pilot->seconds : 0;
-  guiding.pilot = runPilot(job, camera, path, GuidedIntegrator(scene, options, sampler));
-  guiding.pilot->seconds = earlier + watch.seconds();
+  Pilot pilot = runPilot(job, camera, path, GuidedIntegrator(scene, options, sampler));
+  pilot.seconds = watch.seconds();
+  return pilot;
 }
 
-/// Decides for automatic how long to train. Where path tracing is better, training is lost time. So the integrators are
-/// compared twice in its course, with few passes: product seldom wins later where it is clearly worse after the first,
-/// and where it is not clearly better after the second, rendering uses the time better.
+/// Decides for automatic, by a comparison early in training, whether to train further. If product is better already,
+/// more training pays. Otherwise it is lost time, unless path tracing is so noisy that product may become much better:
+/// then the comparison is made again after training.
 ExtendTraining decideEarly(const RenderJob& job, const RenderScene& scene, const RayCamera& camera, Guiding& guiding) {
-  return [&, comparisons = 0](const Field& field) mutable -> std::optional<double> {
-    constexpr double kWorse = 1.2, kBetter = 0.6;
-    if (++comparisons > 2) return std::nullopt;
-    runPilotEarly(job, scene, camera, field, guiding);
-    const double ratio = guiding.pilot->ratio();
-    if (comparisons == 1 && ratio > kBetter)
-      return ratio > kWorse ? std::nullopt : std::optional(2 * kTrialFraction * *job.seconds);
-    comparisons = 2;
+  return [&](const Field& field) -> std::optional<double> {
+    constexpr double kNoisy = 0.3, kHopeless = 1.3;
+    if (guiding.pilot) return std::nullopt;
+    guiding.pilot = runPilotEarly(job, scene, camera, field, guiding);
+    Pilot& pilot = *guiding.pilot;
+    pilot.provisional =
+        pilot.best() == IntegratorKind::path && pilot.path.variance > kNoisy && pilot.ratio() < kHopeless;
     return guiding.prefersPath() ? std::nullopt : std::optional(kTrainingFraction * *job.seconds);
   };
 }
@@ -146,9 +145,11 @@ AnyIntegrator makeUnidirectional(const RenderJob& job, const RenderScene& scene,
   const PathOptions optionsOfPath = options;
   if (guiding.counts) options.counts = &*guiding.counts;
   auto guided = std::make_unique<GuidedIntegrator>(scene, options, *guiding.sampler);
-  if (job.integrator == IntegratorKind::automatic && !guiding.pilot) {
+  if (job.integrator == IntegratorKind::automatic && (!guiding.pilot || guiding.pilot->provisional)) {
     auto path = std::make_unique<PathIntegrator>(scene, optionsOfPath);
+    const double earlier = guiding.pilot ? guiding.pilot->seconds : 0;
     guiding.pilot = runPilot(job, camera, *path, *guided);
+    guiding.pilot->seconds += earlier;
     if (guiding.prefersPath()) return path;
   }
   if (auto withLightPaths = makeWithLightPaths(job, scene, camera, options, guiding)) return withLightPaths;

@@ -29,7 +29,8 @@ using RunSettings = std::vector<std::pair<std::string, std::string>>;
 /// The comparison of path and product for IntegratorKind::automatic.
 struct Pilot {
   PilotResult path, product;
-  double seconds;
+  double seconds;            ///< of all comparisons
+  bool provisional = false;  ///< the comparison is to be made again after training
 
   /// The inefficiency of product relative to that of path.
   double ratio() const { return product.inefficiency() / path.inefficiency(); }
@@ -63,7 +64,7 @@ struct Guiding {
     return secondsLights + training.report.seconds + secondsCounts + (pilot ? pilot->seconds : 0) + secondsLightPaths;
   }
   /// Whether the pilot has chosen path.
-  bool prefersPath() const { return pilot && pilot->best() == IntegratorKind::path; }
+  bool prefersPath() const { return pilot && !pilot->provisional && pilot->best() == IntegratorKind::path; }
   const LobeCacheSet* cachesOrNull() const { return caches ? &*caches : nullptr; }
   std::size_t unreducedBytes = 0;  ///< size of the records before merging
 
