@@ -8,7 +8,7 @@
 
 #include "runtime/image/image_output.h"
 
-namespace CLI {
+namespace CLI {  // NOLINT(readability-identifier-naming)
 class App;
 class Option;
 }  // namespace CLI

@@ -15,7 +15,7 @@
 
 #include "runtime/core/stop_flag.h"
 
-namespace CLI {
+namespace CLI {  // NOLINT(readability-identifier-naming)
 class App;
 }
 

@@ -22,11 +22,13 @@ const lobe::fuzz::FuzzTarget& target() {
 
 }  // namespace
 
+// NOLINTNEXTLINE(readability-identifier-naming)
 extern "C" int LLVMFuzzerInitialize(int*, char***) {
   target();
   return 0;
 }
 
+// NOLINTNEXTLINE(readability-identifier-naming)
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const lobe::fuzz::FuzzTarget& read = target();
   lobe::fuzz::readOrRefuse(read, std::as_bytes(std::span(data, size)));
