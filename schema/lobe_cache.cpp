@@ -29,9 +29,8 @@ void checkRecord(const CacheRecord& r, std::size_t index, std::span<const CacheC
   require((r.cosineMass > 0 || r.count == 0) && r.cosineMass <= 1.0001f, "cosine mass out of range");
   require(r.outside >= 0 && r.outside <= 1, "fraction outside the disc out of range");
   require(r.count <= kMaxCacheComponents, "number of components out of range");
-  if (r.count == 0) return;
   require(componentsInRange(r.first, r.count, components), "components out of range");
-  require(weightsSumToOne(components.subspan(r.first, r.count)), "the weights do not sum to one");
+  require(r.count == 0 || weightsSumToOne(components.subspan(r.first, r.count)), "the weights do not sum to one");
 }
 
 LobeCacheInfo readInfo(const fb::LobeCache& cache, const std::string& file) {

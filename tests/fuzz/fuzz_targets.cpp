@@ -66,7 +66,8 @@ FuzzTarget ofPayload(const FileFormat& format, const FuzzTarget& read) {
 void readLobe(const fs::path& path) {
   const LobeCache cache = LobeCache::open(path);
   for (const CacheRecord& record : cache.records())
-    if (cache.components(record).empty()) std::abort();
+    for (const CacheComponent& component : cache.components(record))
+      if (!(component.weight >= 0)) std::abort();
 }
 
 void readIllumination(const fs::path& path) {

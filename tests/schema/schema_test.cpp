@@ -206,6 +206,8 @@ TEST_CASE("schema: invalid values in caches are rejected") {
       {"not positive definite", [](Content& c) { c.components[2] = {0.75f, 0, 0, 0, 0, 0}; }},
       {"components out of range", [](Content& c) { c.records[1].first = 2; }},
       {"components out of range", [](Content& c) { c.records[1].first = 0xffffffffu; }},
+      {"components out of range",
+       [](Content& c) { c.records[1].count = 0, c.records[1].cosineMass = 0, c.records[1].first = 1000; }},
       {"direction out of range", [](Content& c) { c.records[1].entry = 2; }},
       {"record out of range", [](Content& c) { c.lookup[0] = 2; }},
       {"number of components", [](Content& c) { c.records[0].count = kMaxCacheComponents + 1; }},
