@@ -155,8 +155,7 @@ void declare(CLI::App& app, Options& options) {
   app.add_option("--integrator", job.integrator,
                  "Integrator: path (BSDF sampling), bdpt (bidirectional path tracing), vcm (vertex connection and "
                  "merging, which is biased but consistent), guided (illumination and BSDF), product (BRDF times "
-                 "illumination), or auto: path or product, whichever has the lower error in a short comparison after "
-                 "training")
+                 "illumination), or auto: path or product, whichever has the lower error in a short comparison")
       ->transform(oneOf(kIntegratorNames))
       ->default_str("auto");
   declareBidirectional(app, options);

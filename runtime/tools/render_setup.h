@@ -34,8 +34,8 @@ struct Pilot {
 
   /// The inefficiency of product relative to that of path.
   double ratio() const { return product.inefficiency() / path.inefficiency(); }
-  /// product if it is clearly better. At the sample counts of pictures, path gains more from stratification than at
-  /// those of the comparison: where the ratio was 0.8, the errors of pictures were equal.
+  /// product if it is clearly better. Pictures have more samples than the comparison, and path gains more from their
+  /// stratification: without a margin, product was chosen in scenes in which path had the lower error.
   IntegratorKind best() const { return ratio() < 0.8 ? IntegratorKind::product : IntegratorKind::path; }
 };
 
