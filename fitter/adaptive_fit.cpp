@@ -1,10 +1,10 @@
 #include "fitter/adaptive_fit.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <optional>
+#include <vector>
 
 #include <Eigen/LU>
 
@@ -19,8 +19,16 @@ namespace {
 // More components must lower the second moment by this fraction of the requested quality to be worth their cost at
 // every look-up.
 constexpr double kWorthwhile = 0.25;
-// Numbers of components to try after one.
-constexpr std::array<std::uint32_t, 5> kSizes{2, 3, 4, 6, 8};
+
+/// Numbers of components to try after one, up to `most`.
+std::vector<std::uint32_t> sizesUpTo(std::uint32_t most) {
+  std::vector<std::uint32_t> sizes;
+  for (const std::uint32_t size : {2, 3, 4, 6, 8, 12, 16, 24})
+    if (size < most) sizes.push_back(size);
+  sizes.push_back(most);
+  return sizes;
+}
+
 // Decisions need fewer points than the stored grades.
 constexpr std::uint32_t kDecisionFraction = 4;
 // This standard deviation on the disc is over ten times smaller than that of the initial incident-radiance mixtures.
@@ -78,7 +86,7 @@ std::vector<int> entriesOf(const Lobe& lobe, const DirectionGrid& grid) {
 class DirectionFits {
  public:
   DirectionFits(const Lobe& lobe, const Vec3& wo, const FitSettings& settings)
-      : fitter_(lobe, wo, settings.samples), settings_(settings) {
+      : fitter_(lobe, wo, settings.samples), settings_(settings), sizes_(sizesUpTo(settings.components)) {
     // For the many records of an anisotropic lobe, this would take most of the fitting time.
     if (lobe.kind() != LobeKind::isotropic) return;
     most_ = byWeightedEm(settings.components);
@@ -123,9 +131,9 @@ class DirectionFits {
 
   /// Tries `first` and more components until the fit is good enough; keeps more components only if they are worth it.
   FittedRecord more(FittedRecord best, std::uint32_t first) const {
-    for (const std::uint32_t size : kSizes) {
+    for (const std::uint32_t size : sizes_) {
       if (goodEnough(best)) break;
-      if (size < first || size > settings_.components) continue;
+      if (size < first) continue;
       FittedRecord fitted = with(size);
       const double gain = 1 - secondMoment(fitted) / secondMoment(best);
       if (gain > kWorthwhile * settings_.quality) best = std::move(fitted);
@@ -135,7 +143,7 @@ class DirectionFits {
 
   /// Reduces the number of components while the fit stays good enough.
   FittedRecord less(FittedRecord best) const {
-    for (auto size = kSizes.rbegin(); size != kSizes.rend(); ++size) {
+    for (auto size = sizes_.rbegin(); size != sizes_.rend(); ++size) {
       if (*size >= best.record.count) continue;
       FittedRecord fitted = with(*size);
       if (!goodEnough(fitted)) break;
@@ -146,6 +154,7 @@ class DirectionFits {
 
   DirectionFitter fitter_;
   FitSettings settings_;
+  std::vector<std::uint32_t> sizes_;  // numbers of components, increasing
   std::optional<FittedRecord> most_;  // weighted EM with the largest number of components
 };
 

@@ -60,8 +60,9 @@ LobeCacheInfo infoFor(const Lobe& lobe, const DirectionGrid& grid, const FitSett
 
 /// Why a cache with the header `have` cannot be used for `want`; empty if it can. The tool's version does not matter,
 /// since changes that affect a fit increase a revision.
-std::string difference(const LobeCacheInfo& have, const LobeCacheInfo& want) {
+std::string difference(const LobeCacheInfo& have, const LobeCacheInfo& want, const Lobe& lobe) {
   if (have.key != want.key) return "it was fitted for a different lobe";
+  if (have.quarter && !lobe.mirrorSymmetric()) return "it was fitted for a mirror-symmetric lobe";
   if (have.modelRevision != want.modelRevision) return "the model's code has changed";
   if (have.settings.revision != want.settings.revision) return "the fitting code has changed";
   if (have.settings != want.settings) return "different fit settings";
@@ -72,7 +73,7 @@ std::string difference(const LobeCacheInfo& have, const LobeCacheInfo& want) {
 void check(CompileJob& job, bool force) {
   if (!std::filesystem::exists(job.path)) return;
   try {
-    job.stale = force ? "--force" : difference(LobeCache::open(job.path).info(), job.info);
+    job.stale = force ? "--force" : difference(LobeCache::open(job.path).info(), job.info, *job.use.lobe);
     job.upToDate = job.stale.empty();
   } catch (const std::runtime_error& e) {
     job.stale = e.what();
@@ -146,12 +147,6 @@ FittedRecord fitOfChain(const Lobe& lobe, const Vec3& wo, GridKind kind, const s
   const DirectionFitter fitter(lobe, wo, settings.samples);
   return notAboveWeightedEm(
       fitter, settings, neighbour ? fitFromNeighbour(fitter, wo, kind, *neighbour, settings) : fitter.fit(settings));
-}
-
-/// Ends a chain early if its loop has been cancelled, because a chain may take many seconds.
-void throwIfCancelled() {
-  tbb::task_group_context* context = tbb::task::current_context();
-  if (context && context->is_group_execution_cancelled()) throw LoopCancelled();
 }
 
 void fitChain(const Lobe& lobe, const DirectionGrid& grid, const std::vector<int>& chain, const FitSettings& settings,

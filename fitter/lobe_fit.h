@@ -14,7 +14,7 @@
 namespace lobe {
 
 /// Increased whenever a code change alters the results of a fit; caches of another revision are stale.
-inline constexpr std::uint32_t kFitRevision = 3;
+inline constexpr std::uint32_t kFitRevision = 4;
 
 // FitMethod::wem: weighted EM; ceres: least squares, FitObjective::product; eq8: least squares by the objective of
 // Herholz et al. 2016, Eq. 8; automatic: the cheapest of wem and ceres that meets the quality target (adaptive_fit.h).

@@ -156,8 +156,8 @@ struct Camera {
   int width = 768;           ///< of the film, in pixels
   int height = 576;
   std::optional<FilmCrop> crop;  ///< part of the film that is rendered
-  /// Principal point offset: a film point shows what the point displaced by this vector (to the right and down) would
-  /// show without the offset. In fractions of the film's width and height.
+  /// Principal point offset (Mitsuba 3's principal_point_offset): added to a film point before its ray is made, to the
+  /// right and down, in fractions of the film's width and height.
   Vec2 shift = Vec2::Zero();
   float apertureRadius = 0;  ///< of a thin lens, in units of the camera's local frame
   float focusDistance = 1;   ///< from the lens to the focal plane along +z, in the same units

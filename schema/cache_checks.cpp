@@ -11,6 +11,8 @@ namespace {
 constexpr double kWeightTolerance = 1e-4;
 // The determinant of a more elongated covariance is not accurate in single precision.
 constexpr double kMinRelativeDeterminant = 1e-7;
+// Densities of narrower components overflow in single precision.
+constexpr float kMinVariance = 1e-20f;
 
 void checkComponent(const CacheComponent& c, std::size_t index, const std::string& name) {
   if (!allFinite({c.weight, c.meanX, c.meanY, c.covXX, c.covXY, c.covYY}))
@@ -18,7 +20,7 @@ void checkComponent(const CacheComponent& c, std::size_t index, const std::strin
   if (c.weight < 0) refuseDamaged(name, fmt::format("component {} has the negative weight {}", index, c.weight));
   const double diagonal = static_cast<double>(c.covXX) * c.covYY;
   const double determinant = diagonal - static_cast<double>(c.covXY) * c.covXY;
-  if (!(c.covXX > 0 && c.covYY > 0 && determinant > kMinRelativeDeterminant * diagonal))
+  if (!(c.covXX >= kMinVariance && c.covYY >= kMinVariance && determinant > kMinRelativeDeterminant * diagonal))
     refuseDamaged(name, fmt::format("the covariance of component {} is not positive definite", index));
 }
 

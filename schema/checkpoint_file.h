@@ -14,7 +14,7 @@
 
 namespace lobe {
 
-inline constexpr FileFormat kCheckpointFormat{{'C', 'K', 'P', 'T'}, 3, 0};
+inline constexpr FileFormat kCheckpointFormat{{'C', 'K', 'P', 'T'}, 4, 0};
 
 // Read in place: the layout of these structs equals that of the schema (size checked at compile time, order of the
 // fields by a test).
@@ -28,7 +28,7 @@ struct StoredPass {
   double logLikelihood;  ///< NaN if not known
 };
 struct StoredPilot {
-  double pathVariance, pathCost, productVariance, productCost, seconds;
+  double pathVariance, pathCost, productVariance, productCost, limit, seconds;
 };
 struct StoredLightPathTrial {
   double variance, cost, pathsPerPixel, secondMoment, left, costWithLight, seconds;
@@ -54,9 +54,9 @@ inline constexpr std::uint64_t kMaxCheckpointPixels = std::uint64_t{1} << 25;
 class CheckpointFile {
  public:
   /// Reads the file and checks its structure and content: one pixel for each place of the film, sums that are finite
-  /// and not negative, sample counts that fit an int, times and a number of light
-  /// paths that are finite and not negative. Illumination and importance are not checked. Throws
-  /// std::runtime_error that names the file and the fault.
+  /// and not negative, sample counts that fit an int, times and a number of light paths that are finite and not
+  /// negative. Illumination and importance are not checked. Throws std::runtime_error that names the file and the
+  /// fault.
   static CheckpointFile open(const std::filesystem::path& path);
 
   const CheckpointInfo& info() const { return info_; }

@@ -15,6 +15,8 @@ static_assert(sizeof(StoredIllumination) == sizeof(fb::IlluminationRecord));
 static_assert(std::is_trivially_copyable_v<StoredIllumination> && std::is_standard_layout_v<StoredIllumination>);
 
 constexpr float kFrameTolerance = 1e-3f;
+// BSDF sampling must keep a positive probability; training learns no fractions below 0.05.
+constexpr float kMinStoredFraction = 0.01f;
 
 using Vector = std::array<float, 3>;
 
@@ -40,9 +42,10 @@ void checkRecord(const StoredIllumination& r, std::size_t index, std::span<const
   require(r.background >= 0 && r.background <= 1, "weight of the background out of range");
   require(r.irradiance >= 0, "a negative irradiance");
   require(r.samples >= 0, "a negative number of samples");
-  require(r.bsdfFraction > 0 && r.bsdfFraction < 1, "BSDF sampling fraction out of range");
+  require(r.bsdfFraction >= kMinStoredFraction && r.bsdfFraction < 1, "BSDF sampling fraction out of range");
   require(r.count <= kMaxStoredComponents, "number of components out of range");
   require(componentsInRange(r.first, r.count, components), "components out of range");
+  require(r.count > 0 || r.background == 1, "no components, and the background does not have all weight");
   require(r.count == 0 || weightsSumToOne(components.subspan(r.first, r.count)), "the weights do not sum to one");
 }
 

@@ -1,8 +1,7 @@
 // A path tracer for spheres that compares three ways of sampling directions at the same number of samples: BSDF
-// sampling
-// ("plain"), the illumination learnt by a lobe::Field ("guided"), and the product of that illumination with a glossy
-// lobe ("product"). In the scene, an occluded lamp illuminates a room with diffuse and glossy spheres indirectly. There
-// is no next-event estimation, so that directional sampling must find all light.
+// sampling ("plain"), the illumination learnt by a lobe::Field ("guided"), and the product of that illumination with a
+// glossy lobe ("product"). In the scene, an occluded lamp illuminates a room with diffuse and glossy spheres
+// indirectly. There is no next-event estimation, so that directional sampling must find all light.
 
 #include <algorithm>
 #include <cmath>

@@ -235,7 +235,8 @@ class Principled final : public Bsdf {
     if (!wi || wi->z() == 0.0f) return std::nullopt;
     const float density = point.pdf(above, *wi);
     if (!(density > 0.0f)) return std::nullopt;
-    return BsdfSample{front ? *wi : flipped(*wi), point.eval(above, *wi), density};
+    const double eta = wi->z() > 0.0f ? 1.0 : front ? eta_ : 1.0 / eta_;
+    return BsdfSample{front ? *wi : flipped(*wi), point.eval(above, *wi), density, static_cast<float>(eta)};
   }
 
   float pdf(const Vec3& wo, const Vec3& wi, const Vec2& uv) const override {

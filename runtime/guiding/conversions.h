@@ -1,6 +1,8 @@
 #pragma once
 // Conversions between the public vector types and Eigen's.
 
+#include <cmath>
+
 #include <Eigen/Core>
 
 #include "lobe/types.h"
@@ -19,6 +21,10 @@ inline Float2 toFloats(const Vec2& v) {
 }
 inline Float3 toFloats(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
+}
+
+inline bool isFinite(const Float3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
 }  // namespace lobe

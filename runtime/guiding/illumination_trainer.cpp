@@ -37,7 +37,7 @@ struct Placed {
 }  // namespace
 
 void TrainingOptions::validate() const {
-  require(components >= 1 && components <= kMaxIlluminationComponents / 2, "components", "from 1 to 8");
+  require(components >= 1 && components <= kMaxLightComponents, "components", "from 1 to 8");
   require(neighbours >= 1, "neighbours", "at least 1");
   require(reservoir >= 0, "reservoir", "at least 0");
   require(unitFraction > 0 && unitFraction <= 1, "unitFraction", "in (0, 1]");
@@ -48,13 +48,17 @@ IlluminationTrainer::IlluminationTrainer(const TrainingOptions& options, float s
                                          std::vector<IlluminationRecord> kept)
     : options_(options), unit_(options.unitFraction * sceneDiagonal), kept_(std::move(kept)) {
   options.validate();
+  for (const IlluminationRecord& record : kept_) unit_ = std::max(unit_, record.radius);
   if (!kept_.empty()) rebuildCache();
 }
 
 std::optional<double> IlluminationTrainer::learn(std::span<const std::span<const Particle>> sources,
                                                  std::span<const RecordRequest> requests) {
   const ParticleNeighbours neighbours(sources, options_.neighbours, unit_);
-  if (neighbours.empty()) return std::nullopt;
+  if (neighbours.empty()) {
+    if (!records_.empty()) rebuildCache();  // fractions may have been learnt
+    return std::nullopt;
+  }
   const std::optional<double> likelihood = updateAll(neighbours);
   makeRecords(neighbours, requests);
   return likelihood;

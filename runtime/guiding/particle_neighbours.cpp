@@ -27,7 +27,7 @@ class NearestSet {
 
   NearestSet(std::span<const Particle> particles, const Vec3& n, std::size_t count, float maxDistance2)
       : particles_(particles), n_(n), count_(count), worst_(maxDistance2) {
-    neighbours_.reserve(2 * count);
+    neighbours_.reserve(std::min(2 * count, particles.size()));
   }
 
   std::span<const Neighbour> finish() {
@@ -117,8 +117,9 @@ Neighbourhood ParticleNeighbours::around(const Vec3& x, const Vec3& n, const Vec
     const std::size_t first = all.points.size();
     const Tally tally = tree->collect(x, n, tangent, all.points);
     const double effective = tally.effectiveSamples();
-    if (!(effective > 0)) continue;
+    // Of photons without weight, too, whose light only next-event estimation finds.
     if (tally.radius2 > 0) all.irradiance += static_cast<float>(tally.flux / (std::numbers::pi * tally.radius2));
+    if (!(effective > 0)) continue;
     const double scale = effective / tally.weight;
     for (std::size_t i = first; i < all.points.size(); ++i)
       all.points[i].weight = static_cast<float>(all.points[i].weight * scale);

@@ -64,7 +64,8 @@ void PathRecorder::end() {
   for (int i = 0; i < count_; ++i) {
     const Vertex& v = vertices_[static_cast<std::size_t>(i)];
     const float weight = v.cosineOverPdf * v.radiance;
-    if (options_.particles && usable(weight))
+    const bool finite = isFinite(v.position) && isFinite(v.normal) && isFinite(v.direction);
+    if (options_.particles && usable(weight) && finite)
       data.samples.push_back({toEigen(v.position), toEigen(v.normal), toEigen(v.direction), weight, v.distance});
     if (!v.fraction) continue;
     const float fractionWeight = v.fraction->weight * v.radiance;

@@ -36,7 +36,8 @@ RequestCubes::RequestCubes(std::span<const RecordRequest> requests, float edge,
   std::vector<Keyed> keyed(requests.size());
   parallelFor(std::size_t{0}, requests.size(), [&](std::size_t i) {
     const RecordRequest& r = requests[i];
-    const Eigen::Vector3i cube = (r.position / edge).array().floor().cast<int>();
+    constexpr float kOutermost = 1 << 30;  // as in IlluminationCache: farther points do not fit into integers
+    const Eigen::Vector3i cube = (r.position / edge).array().floor().max(-kOutermost).min(kOutermost).cast<int>();
     keyed[i] = {counts(r) ? keyOf(cube) : kNoCube, static_cast<std::uint32_t>(i)};
   });
   parallelSort(keyed,

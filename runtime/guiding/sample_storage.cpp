@@ -135,14 +135,13 @@ void SampleStorage::beginPath(std::uint64_t index) {
 
 void SampleStorage::addPhoton(const Float3& position, const Float3& normal, const Float3& direction, float weight,
                               float distance, float flux) {
-  const auto finite = [](const Float3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); };
   const bool usable = std::isfinite(weight) && weight >= 0 && std::isfinite(flux) && flux >= 0 && distance >= 0;
-  if (!usable || !finite(position) || !finite(normal) || !finite(direction)) return;
+  if (!usable || !isFinite(position) || !isFinite(normal) || !isFinite(direction)) return;
   data_->photons.push_back({toEigen(position), toEigen(normal), toEigen(direction), weight, distance, flux});
 }
 
 void SampleStorage::requestRecord(const Float3& position, const Float3& normal) {
-  data_->requests.push_back({toEigen(position), toEigen(normal)});
+  if (isFinite(position) && isFinite(normal)) data_->requests.push_back({toEigen(position), toEigen(normal)});
 }
 
 void SampleStorage::merge(SampleStorage&& other) {

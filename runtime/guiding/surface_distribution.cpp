@@ -70,10 +70,11 @@ void SurfaceDistribution::Impl::collectReflectance(const SurfaceReflectance& giv
 
 FractionSample SurfaceDistribution::Impl::fractionSample(const Vec3& wi, float bsdfPdf) const {
   // The probability of the mixtures, including the product's background term that is left to BSDF sampling.
-  const float divided = representable * (1 - record->bsdfFraction);
-  const float background = density->bsdfFraction() - (1 - divided);
-  const float mixtures = (std::max(0.0f, background) * bsdfPdf + density->guidedPdf(axes * wi)) / divided;
-  return {record->index, bsdfPdf, mixtures, representable};
+  const float mixtureProbability = representable * (1 - record->bsdfFraction);
+  const float background = density->bsdfFraction() - (1 - mixtureProbability);
+  const float mixtureDensity =
+      (std::max(0.0f, background) * bsdfPdf + density->guidedPdf(axes * wi)) / mixtureProbability;
+  return {record->index, bsdfPdf, mixtureDensity, representable};
 }
 
 SurfaceDistribution::SurfaceDistribution(const Field& field, const ShadingPoint& point) {

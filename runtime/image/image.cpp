@@ -157,7 +157,7 @@ std::optional<Image> readExrPixels(const std::filesystem::path& path, const Name
   if (!names) return std::nullopt;
   const Area data(file.header().dataWindow()), display(file.header().displayWindow());
   checkExpansion(path, data.width, data.height, std::filesystem::file_size(path), kMostPerExrByte);
-  checkSize(path, display.width, display.height);
+  checkExpansion(path, display.width, display.height, std::filesystem::file_size(path), kMostPerExrByte);
   Image image = readDataWindow(path, file, data, *names);
   return data == display ? image : placeOnDisplay(image, data, display);
 }

@@ -153,6 +153,10 @@ void checkImageName(const std::filesystem::path& path) {
         fmt::format("{}: unsupported image format; images are written as .exr or .png", path.string()));
 }
 
+bool isExrName(const std::filesystem::path& path) {
+  return extensionOf(path) == ".exr";
+}
+
 void writePng(const std::filesystem::path& path, int width, int height, const std::vector<std::uint8_t>& rgb) {
   std::vector<std::byte> bytes;
   if (width < 1 || height < 1 || !stbi_write_png_to_func(appendBytes, &bytes, width, height, 3, rgb.data(), 3 * width))

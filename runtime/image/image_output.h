@@ -39,6 +39,9 @@ struct ImageLayer {
 /// found early.
 void checkImageName(const std::filesystem::path& path);
 
+/// Whether the name ends in .exr.
+bool isExrName(const std::filesystem::path& path);
+
 /// Writes the file atomically. .exr: floating-point RGB and the layers, with the attributes; .png: 8-bit sRGB, clipped
 /// to [0, 1], without attributes and layers. Returns the number of finite values that are too large for the type half
 /// and were replaced by the nearest half. Throws std::runtime_error that names the file.

@@ -87,6 +87,10 @@ Part describe(const std::filesystem::path& path) {
   if (!std::filesystem::exists(path)) throw std::runtime_error(path.string() + ": no such file");
   Part part{path, readAttributes(path), 0, {}};
   const std::optional<std::uint64_t> samples = findCount(part.attributes, "samples");
+  if (const auto interrupted = find<std::string>(part.attributes, "interrupted"))
+    throw std::runtime_error(fmt::format(
+        "{}: the run was interrupted and its pixels have {}; complete it with loberender --resume, or render it again",
+        path.string(), *interrupted));
   if (!samples || *samples == 0)
     throw std::runtime_error(
         fmt::format("{}: does not say how many samples it has; merge .exr files written by loberender", path.string()));

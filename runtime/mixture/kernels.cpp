@@ -48,19 +48,12 @@ HWY_INLINE hn::Vec<D> pairColumns(D d, GaussiansView reflectance, float constant
   return sum;
 }
 
-// Replaces the values by their running sums; returns the last.
+// Replaces the values by their running sums; returns the last. In sequence: in a tree of additions, rounding could make
+// the sum after an empty value differ from that before it, and choosePair choose the empty value.
 HWY_INLINE float sumUp(float* values, int count) {
-  const hn::CappedTag<float, kPaddingMultiple> d;
-  auto sum = hn::Zero(d);
-  for (int k = 0; k < count; k += kPaddingMultiple) {
-    auto v = hn::LoadU(d, values + k);
-    v = hn::Add(v, hn::ShiftLeftLanes<1>(d, v));
-    v = hn::Add(v, hn::ShiftLeftLanes<2>(d, v));
-    v = hn::Add(v, sum);
-    hn::StoreU(v, d, values + k);
-    sum = hn::Broadcast<kPaddingMultiple - 1>(v);
-  }
-  return hn::GetLane(sum);
+  float sum = 0;
+  for (int k = 0; k < count; ++k) values[k] = sum += values[k];
+  return sum;
 }
 
 template <class D>

@@ -1,5 +1,5 @@
 #pragma once
-// The bivariate normal density for inner loops, used for both the weights of pairs and densities so that they agree.
+// The bivariate normal density for inner loops.
 
 #include <cmath>
 #include <numbers>

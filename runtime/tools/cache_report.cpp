@@ -21,7 +21,8 @@ std::string percent(double fraction) {
 Json recordJson(const LobeCache& cache, std::size_t index) {
   const CacheRecord& r = cache.records()[index];
   const Angles angles = anglesOf(directionOf(cache, index));
-  Json json{{"elevation", angles.elevation},
+  Json json{{"entry", r.entry},
+            {"elevation", angles.elevation},
             {"azimuth", angles.azimuth},
             {"integral", shortNumber(r.integral)},
             {"albedo", shortNumber(r.albedo)},
@@ -158,9 +159,10 @@ Json toJson(const LobeCache& cache, const std::filesystem::path& path) {
               {"revision", info.settings.revision},
               {"quality", shortNumber(info.settings.quality)},
               {"fixed_grid", info.settings.fixedGrid}}},
-            {"grid", {{"kind", gridName(grid)}, {"count", grid.count}}},
+            {"grid", {{"kind", gridName(grid)}, {"count", grid.count}, {"quarter", info.quarter}}},
             {"summary", toJson(summarise(cache))},
             {"records", Json::array()}};
+  for (int i = 0; i < grid.count; ++i) json["grid"]["lookup"].push_back(cache.lookup(static_cast<std::uint32_t>(i)));
   for (std::size_t i = 0; i < cache.records().size(); ++i) json["records"].push_back(recordJson(cache, i));
   return json;
 }

@@ -22,13 +22,13 @@ Film::Pixel loaded(const StoredPixel& p) {
 
 std::optional<StoredPilot> storedPilot(const std::optional<Pilot>& p) {
   if (!p) return std::nullopt;
-  return StoredPilot{p->path.variance, p->path.cost, p->product.variance, p->product.cost, p->seconds};
+  return StoredPilot{p->path.variance, p->path.cost, p->product.variance, p->product.cost, p->limit, p->seconds};
 }
 
 std::optional<StoredLightPathTrial> storedTrial(const std::optional<LightPathTrial>& t, double seconds) {
   if (!t) return std::nullopt;
-  return StoredLightPathTrial{t->variance, t->cost,          t->pathsPerPixel, t->secondMoment,
-                              t->left,     t->costWithLight, seconds};
+  return StoredLightPathTrial{t->variance,         t->cost,          t->pathsPerPixel, t->secondMoment,
+                              t->secondMomentLeft, t->costWithLight, seconds};
 }
 
 /// All counters of the statistics, in a fixed order.
@@ -110,7 +110,7 @@ TrainingReport trainingOf(const CheckpointFile& file) {
 
 void restoreChoices(const CheckpointFile& file, Guiding& guiding) {
   if (const auto& p = file.info().pilot)
-    guiding.pilot = {{p->pathVariance, p->pathCost}, {p->productVariance, p->productCost}, p->seconds};
+    guiding.pilot = Pilot{{{p->pathVariance, p->pathCost}, {p->productVariance, p->productCost}, p->limit}, p->seconds};
   if (const auto& t = file.info().lightPathTrial) {
     guiding.lightPaths = {t->variance, t->cost, t->pathsPerPixel, t->secondMoment, t->left, t->costWithLight};
     guiding.secondsLightPaths = t->seconds;

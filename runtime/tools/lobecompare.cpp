@@ -106,7 +106,11 @@ void checkMerge(const Arguments& arguments) {
   if (arguments.variance.empty()) return;
   if (std::filesystem::path(arguments.variance).extension() != ".exr")
     throw lobe::UsageError("--variance must name an .exr file");
-  if (arguments.variance == arguments.merge) throw lobe::UsageError("--merge and --variance must name different files");
+  const auto canonical = [](const std::string& name) {
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(name));
+  };
+  if (canonical(arguments.variance) == canonical(arguments.merge))
+    throw lobe::UsageError("--merge and --variance must name different files");
 }
 
 void checkPng(const Arguments& arguments) {

@@ -99,6 +99,7 @@ void validate(const Options& o) {
       throw UsageError(fmt::format("--points {}: must be a .ply file", o.points));
   }
   if (!o.scene.empty() && o.plot.empty() && o.html.empty()) throw UsageError("--scene needs --plot or --html");
+  if (!o.read.definitions.empty() && o.scene.empty()) throw UsageError("-D needs --scene");
   std::vector<std::filesystem::path> inputs(o.files.begin(), o.files.end());
   inputs.emplace_back(o.scene);
   for (const std::string& output : {o.points, o.plot, o.html})

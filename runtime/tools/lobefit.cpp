@@ -66,6 +66,9 @@ void declare(CLI::App& app, Options& o) {
   app.add_flag("--check", o.check,
                "Only read the materials and print all faults, warnings and notes; exit with 1 if they cannot be read");
   app.add_flag("--json", o.json, "Print the table of caches, or the result of --check, as JSON");
+  app.add_option("--camera", o.read.camera,
+                 "Scene file whose sensor will be used: -D may define names of this file, too")
+      ->type_name("FILE.xml");
   addThreads(app, o.threads);
   addDefinitions(app, o.read.definitions);
 }
@@ -186,17 +189,13 @@ void reportSummary(const std::vector<CacheReport>& reports, const Options& o) {
 void reportMissedQuality(const std::vector<CacheReport>& reports, const Options& o) {
   if (o.compile.settings.method != FitMethod::automatic) return;
   const float quality = o.compile.settings.quality;
-  const CacheReport* worst = nullptr;
-  int missing = 0;
-  for (const CacheReport& r : reports) {
-    if (r.summary.nevWorst <= quality) continue;
-    ++missing;
-    if (!worst || r.summary.nevWorst > worst->summary.nevWorst) worst = &r;
-  }
-  if (worst)
-    printNote("lobefit",
-              fmt::format("{} of {} lobes have records that miss --quality {:g}; the worst NEV is {:.3f}, of {}",
-                          missing, reports.size(), quality, worst->summary.nevWorst, worst->lobe));
+  const auto worstNev = [](const CacheReport& r) { return std::max(r.summary.nevWorst, r.summary.coverageWorst); };
+  const auto missing = std::ranges::count_if(reports, [&](const CacheReport& r) { return worstNev(r) > quality; });
+  if (missing == 0) return;
+  const CacheReport& worst = *std::ranges::max_element(reports, {}, worstNev);
+  printNote("lobefit",
+            fmt::format("{} of {} lobes have records that miss --quality {:g}; the worst NEV is {:.3f}, of {}", missing,
+                        reports.size(), quality, worstNev(worst), worst.lobe));
 }
 
 void run(Options& o) {

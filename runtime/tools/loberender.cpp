@@ -75,8 +75,10 @@ struct Options {
   int threads = 0;
   bool check = false, json = false;
   // Options that some integrators ignore.
-  const CLI::Option *guide = nullptr, *reduction = nullptr, *roulette = nullptr, *lightPaths = nullptr;
+  const CLI::Option *guide = nullptr, *reduction = nullptr, *roulette = nullptr, *lightPaths = nullptr,
+                    *shadowSurfaces = nullptr;
   std::vector<const CLI::Option*> training, merging;
+  std::vector<CLI::Option*> exr;  // for .exr files only
 };
 
 /// Declares the training options.
@@ -144,11 +146,13 @@ void declare(CLI::App& app, Options& options) {
       ->type_name("FILE")
       ->default_str("")
       ->allow_extra_args(false);  // otherwise it would take the scene after it as another picture
-  app.add_option("--aov", options.aovs,
-                 fmt::format("AOVs that are stored with the picture in .exr files, separated by commas: {}, or all",
-                             fmt::join(kAovNames, ", ")))
-      ->type_name("LIST");
-  addExrOptions(app, job.exr);
+  auto* aovs =
+      app.add_option("--aov", options.aovs,
+                     fmt::format("AOVs that are stored with the picture in .exr files, separated by commas: {}, or all",
+                                 fmt::join(kAovNames, ", ")))
+          ->type_name("LIST");
+  options.exr = addExrOptions(app, job.exr);
+  options.exr.push_back(aovs);
   app.add_option("--cache", job.cacheFolder, "Folder of the BRDF caches made by lobefit")
       ->type_name("DIR")
       ->capture_default_str();
@@ -163,8 +167,7 @@ void declare(CLI::App& app, Options& options) {
          "--gradients", job.gradients,
          "Gradient-domain rendering with path, bdpt, guided or product: samples the differences of neighbouring "
          "pixels, too, and reconstructs the picture from them in l2 (unbiased, except that negative pixels become "
-         "zero) "
-         "or l1 (less noise from outliers, but biased)")
+         "zero) or l1 (less noise from outliers, but biased)")
       ->transform(oneOf(kNormNames));
   app.add_option("--spp", job.samples, "Number of samples per pixel");
   app.add_option("--sample-offset", job.sampleOffset,
@@ -235,6 +238,7 @@ void declare(CLI::App& app, Options& options) {
   app.add_flag("--json", options.json, "Print the result of --check as JSON")->needs(check);
   options.reduction = app.get_option("--reduction");
   options.lightPaths = app.get_option("--light-paths");
+  options.shadowSurfaces = app.get_option("--shadow-surfaces");
   options.roulette = app.get_option("--russian-roulette");
   declareTraining(app, options);
   addDefinitions(app, job.definitions);
@@ -254,9 +258,20 @@ void noteUnused(const Options& options) {
     note(option, option->get_name() == "--bsdf-fraction" ? job.mayUseProduct() : job.guided());
   note(options.reduction, job.guided());
   note(options.lightPaths, job.mayUseLightPaths());
+  note(options.shadowSurfaces, job.connectsThroughSurfaces());
   note(options.roulette, job.guided() && job.integrator != IntegratorKind::bdpt && !job.gradients);
   if (!unused.empty())
     printNote("loberender", fmt::format("--integrator {} ignores {}", nameOf(job.integrator), fmt::join(unused, ", ")));
+}
+
+/// AOVs and the format of pixels are for .exr files only.
+void noteWithoutExr(Options& options) {
+  RenderJob& job = options.job;
+  if (job.outputs.empty() || std::ranges::any_of(job.outputs, isExrName)) return;
+  for (const CLI::Option* option : options.exr)
+    if (option->count() > 0)
+      printNote("loberender", fmt::format("{} has no effect, because no output is an .exr file", option->get_name()));
+  job.aovs.clear();
 }
 
 /// Stored illumination that is not trained further leaves no use for the options of training.
@@ -279,6 +294,7 @@ void work(Options& options) {
   options.job.aovs = parseAovs(options.aovs);
   if (!options.record.empty()) options.job.record = parsePair("--record", options.record, ',', "X,Y");
   noteUnused(options);
+  noteWithoutExr(options);
   std::optional<oneapi::tbb::global_control> limit;
   if (options.threads > 0) limit.emplace(oneapi::tbb::global_control::max_allowed_parallelism, options.threads);
   run(options.job, stopOnSignals());

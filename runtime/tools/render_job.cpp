@@ -10,7 +10,6 @@
 
 #include "runtime/image/image_output.h"
 #include "runtime/tools/tool.h"
-#include "scenes/mitsuba/reader.h"
 
 namespace lobe {
 namespace {
@@ -104,8 +103,8 @@ void RenderJob::validate() const {
 std::string lobefitCommand(const RenderJob& job) {
   std::string command =
       fmt::format("lobefit {} -o {}", shellQuoted(job.scene.string()), shellQuoted(job.cacheFolder.string()));
-  const auto definitions = job.camera.empty() ? job.definitions : definitionsUsedBy(job.scene, job.definitions);
-  for (const auto& [name, value] : definitions)
+  if (!job.camera.empty()) command += fmt::format(" --camera {}", shellQuoted(job.camera.string()));
+  for (const auto& [name, value] : job.definitions)
     command += fmt::format(" -D {}", shellQuoted(fmt::format("{}={}", name, value)));
   if (job.lenient) command += " --lenient";
   return command;

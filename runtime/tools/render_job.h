@@ -88,6 +88,10 @@ struct RenderJob {
   bool guided() const;
   /// Whether stored illumination is trained further.
   bool trainsFurther() const { return !illumination.empty() && (passes || trainSeconds); }
+  /// Whether next-event estimation sees through surfaces that transmit light.
+  bool connectsThroughSurfaces() const {
+    return integrator != IntegratorKind::bdpt && integrator != IntegratorKind::vcm;
+  }
   /// Whether camera paths may be combined with light paths.
   bool mayUseLightPaths() const { return guided() && integrator != IntegratorKind::bdpt && !gradients; }
   /// Whether directions may be sampled from the product, which needs BRDF caches.

@@ -58,7 +58,7 @@ nlohmann::ordered_json asJson(const std::optional<LightPathTrial>& trial, bool u
           {"paths_per_pixel", trial->pathsPerPixel},
           {"variance", trial->variance},
           {"second_moment", trial->secondMoment},
-          {"second_moment_left", trial->left},
+          {"second_moment_left", trial->secondMomentLeft},
           {"cost", trial->cost},
           {"cost_with_light_paths", trial->costWithLight}};
 }

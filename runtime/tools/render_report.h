@@ -33,7 +33,8 @@ struct RunResult {
 
   const TrainingReport& training() const { return guiding.training.report; }
   IntegratorKind integrator(const RenderJob& job) const {
-    return guiding.pilot ? guiding.pilot->best() : job.integrator;
+    if (!guiding.pilot) return job.integrator;
+    return guiding.pilot->prefersProduct() ? IntegratorKind::product : IntegratorKind::path;
   }
   double seconds() const { return guiding.seconds() + render.total.seconds; }
 };

@@ -163,7 +163,7 @@ void Run::prepare() {
   else if (stored)
     readStored(*stored);
   const Stopwatch building;
-  renderScene_.emplace(*scene_, job_.shadowSurfaces);
+  renderScene_.emplace(*scene_, job_.connectsThroughSurfaces() ? job_.shadowSurfaces : 0);
   load_.building = building.seconds();
   load_.embree = renderScene_->tracer.buildSeconds();
   camera_.emplace(scene_->camera, scene_->filter);

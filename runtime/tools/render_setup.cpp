@@ -24,9 +24,13 @@ constexpr double kTrainingFraction = 0.15;
 /// Fraction of --seconds after which automatic compares path and product.
 constexpr double kTrialFraction = 0.03;
 
+/// Seconds below which automatic only uses product if it is clearly better early in training: at 8 seconds, training on
+/// and comparing again left little more than half of the time for the picture in living-room-2.
+constexpr double kBrief = 30;
+
 /// Whether automatic compares path and product during training. With limits that are given, or if the illumination is
 /// saved for other runs, all of it is trained.
-bool decidesEarly(const RenderJob& job) {
+bool comparesDuringTraining(const RenderJob& job) {
   return job.integrator == IntegratorKind::automatic && job.seconds && !job.trainSeconds && !job.passes &&
          job.saveIllumination.empty();
 }
@@ -95,7 +99,7 @@ Pilot runPilot(const RenderJob& job, const RayCamera& camera, const Integrator& 
   // The same picture for a seed is only promised for --spp.
   pilot.timed = job.seconds.has_value();
   const auto results = comparePilots(camera, std::array<const Integrator*, 2>{&path, &guided}, pilot);
-  return {results[0], results[1], watch.seconds()};
+  return Pilot{compared(results[0], results[1], job.seconds && *job.seconds < kBrief), watch.seconds()};
 }
 
 /// Compares path and product with what has been learnt so far in training.
@@ -116,17 +120,15 @@ Pilot runPilotEarly(const RenderJob& job, const RenderScene& scene, const RayCam
   return pilot;
 }
 
-/// Decides for automatic, by a comparison early in training, whether to train further. If product is better already,
-/// more training pays. Otherwise it is lost time, unless path tracing is so noisy that product may become much better:
-/// then the comparison is made again after training.
-ExtendTraining decideEarly(const RenderJob& job, const RenderScene& scene, const RayCamera& camera, Guiding& guiding) {
+/// Decides for automatic, by a comparison early in training, whether to train further. If product is clearly better,
+/// more training pays. If it may become better, the comparison is made again after training. Otherwise more training
+/// would be lost time.
+ExtendTraining extendIfProductPays(const RenderJob& job, const RenderScene& scene, const RayCamera& camera,
+                                   Guiding& guiding) {
   return [&](const Field& field) -> std::optional<double> {
-    constexpr double kNoisy = 0.3, kHopeless = 1.3;
     if (guiding.pilot) return std::nullopt;
     guiding.pilot = runPilotEarly(job, scene, camera, field, guiding);
-    Pilot& pilot = *guiding.pilot;
-    pilot.provisional =
-        pilot.best() == IntegratorKind::path && pilot.path.variance > kNoisy && pilot.ratio() < kHopeless;
+    guiding.pilot->provisional = guiding.pilot->isUndecided();
     return guiding.prefersPath() ? std::nullopt : std::optional(kTrainingFraction * *job.seconds);
   };
 }
@@ -203,13 +205,13 @@ void train(const RenderJob& job, const TrainingPlan& plan, const RenderScene& sc
   const bool timed = plan.seconds < kInfinity;
   Progress progress("training", timed ? plan.seconds : plan.passes);
   const TrainedIllumination earlier = std::move(guiding.training);
-  const bool early = decidesEarly(job);
+  const bool early = comparesDuringTraining(job);
   TrainingPlan start = plan;
   if (early) start.seconds = kTrialFraction * *job.seconds;
   guiding.training = trainIllumination(
       scene, camera, guiding.cachesOrNull(), start,
       [&](const PassReport& pass) { progress.advance(timed ? pass.seconds : 1.0); }, earlier.field,
-      early ? decideEarly(job, scene, camera, guiding) : ExtendTraining());
+      early ? extendIfProductPays(job, scene, camera, guiding) : ExtendTraining());
   if (earlier.field.records() > 0 && !earlier.report.learntFractions) guiding.training.report.learntFractions = false;
 }
 

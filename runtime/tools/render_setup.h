@@ -27,16 +27,9 @@ namespace lobe {
 using RunSettings = std::vector<std::pair<std::string, std::string>>;
 
 /// The comparison of path and product for IntegratorKind::automatic.
-struct Pilot {
-  PilotResult path, product;
-  double seconds;            ///< of all comparisons
+struct Pilot : PilotComparison {
+  double seconds = 0;        ///< of all comparisons
   bool provisional = false;  ///< the comparison is to be made again after training
-
-  /// The inefficiency of product relative to that of path.
-  double ratio() const { return product.inefficiency() / path.inefficiency(); }
-  /// product if it is clearly better. Pictures have more samples than the comparison, and path gains more from their
-  /// stratification: without a margin, product was chosen in scenes in which path had the lower error.
-  IntegratorKind best() const { return ratio() < 0.8 ? IntegratorKind::product : IntegratorKind::path; }
 };
 
 /// BRDF caches and trained illumination; both are empty without guiding. Cannot be moved, because the samplers refer to
@@ -64,7 +57,7 @@ struct Guiding {
     return secondsLights + training.report.seconds + secondsCounts + (pilot ? pilot->seconds : 0) + secondsLightPaths;
   }
   /// Whether the pilot has chosen path.
-  bool prefersPath() const { return pilot && !pilot->provisional && pilot->best() == IntegratorKind::path; }
+  bool prefersPath() const { return pilot && !pilot->provisional && !pilot->prefersProduct(); }
   const LobeCacheSet* cachesOrNull() const { return caches ? &*caches : nullptr; }
   std::size_t unreducedBytes = 0;  ///< size of the records before merging
 

@@ -48,7 +48,8 @@ class SunPainter {
   /// preserves both power and mean direction.
   void paint(const SunDisc& sun) const {
     const double pixel = kPiD / image_.height;
-    const int parts = std::max(64, static_cast<int>(std::ceil(16 * sun.radius / pixel)));
+    // Parts of a very large disc are about as large as a pixel, so that their number stays bounded.
+    const int parts = static_cast<int>(std::clamp(std::ceil(16 * sun.radius / pixel), 64.0, 4096.0));
     const Rgb fraction = sun.irradiance / static_cast<float>(parts * static_cast<double>(parts));
     const Eigen::Vector3d centre = toWorld_.transpose() * sun.direction;
     const Eigen::Vector3d side = centre.unitOrthogonal();

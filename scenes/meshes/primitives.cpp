@@ -1,5 +1,6 @@
 #include "scenes/meshes/primitives.h"
 
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -16,16 +17,18 @@ namespace {
 // Rotations are often written with six digits.
 constexpr float kTolerance = 1e-4f;
 
-/// Appends the square centre ± s ± t with texture coordinates from 0 to 1; s × t points to its front.
-void addSquare(TriangleMesh& mesh, const Vec3& centre, const Vec3& s, const Vec3& t) {
+/// Appends the square centre ± s ± t with texture coordinates from 0 to 1, u along s and v along t. front: its normal,
+/// unit, along s × t or against it.
+void addSquare(TriangleMesh& mesh, const Vec3& centre, const Vec3& s, const Vec3& t, const Vec3& front) {
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
   for (const Vec2& uv : {Vec2(0, 0), Vec2(1, 0), Vec2(1, 1), Vec2(0, 1)}) {
     mesh.positions.push_back(centre + (2 * uv.x() - 1) * s + (2 * uv.y() - 1) * t);
-    mesh.normals.push_back(s.cross(t));
+    mesh.normals.push_back(front);
     mesh.uvs.push_back(uv);
   }
-  mesh.triangles.push_back({first, first + 1, first + 2});
-  mesh.triangles.push_back({first, first + 2, first + 3});
+  const bool reversed = s.cross(t).dot(front) < 0;
+  for (const std::uint32_t i : {first + 1, first + 2})
+    mesh.triangles.push_back(reversed ? std::array{first, i + 1, i} : std::array{first, i, i + 1});
 }
 
 // In double precision, because squares of lengths may exceed the range of floats.
@@ -55,17 +58,21 @@ void requireInRange(const Vec3& centre, const Vec3& reach) {
 
 TriangleMesh makeRectangle(const MeshOptions& options) {
   TriangleMesh mesh;
-  addSquare(mesh, Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY());
+  addSquare(mesh, Vec3::Zero(), Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ());
   return finish(std::move(mesh), options);
 }
 
 TriangleMesh makeCube(const MeshOptions& options) {
   TriangleMesh mesh;
-  for (int axis = 0; axis < 3; ++axis) {
-    const Vec3 s = Vec3::Unit((axis + 1) % 3), t = Vec3::Unit((axis + 2) % 3);
-    addSquare(mesh, Vec3::Unit(axis), s, t);
-    addSquare(mesh, -Vec3::Unit(axis), t, s);
-  }
+  const auto addFace = [&](const Vec3& front, const Vec3& u, const Vec3& v) { addSquare(mesh, front, u, v, front); };
+  const Vec3 x = Vec3::UnitX(), y = Vec3::UnitY(), z = Vec3::UnitZ();
+  // The texture coordinates of Mitsuba's cube.
+  addFace(-y, z, x);
+  addFace(y, -x, -z);
+  addFace(x, y, -z);
+  addFace(z, y, x);
+  addFace(-x, y, z);
+  addFace(-z, -y, x);
   return finish(std::move(mesh), options);
 }
 

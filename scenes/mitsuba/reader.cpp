@@ -166,15 +166,6 @@ Scene readScene(const std::filesystem::path& path, const ReadOptions& options) {
   return scene;
 }
 
-std::map<std::string, std::string> definitionsUsedBy(const std::filesystem::path& path,
-                                                     const std::map<std::string, std::string>& definitions) {
-  Findings findings;
-  const SceneFile file(path, definitions, findings);
-  std::map<std::string, std::string> used = definitions;
-  std::erase_if(used, [&](const auto& definition) { return !file.uses(definition.first); });
-  return used;
-}
-
 SceneCheck checkScene(const std::filesystem::path& path, const ReadOptions& options) {
   Findings findings;
   SceneCheck check;

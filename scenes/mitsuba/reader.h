@@ -31,10 +31,6 @@ struct ReadOptions {
 /// this runs has been cancelled.
 Scene readScene(const std::filesystem::path& path, const ReadOptions& options = {});
 
-/// Those of the definitions that the file uses. Throws SceneError if the file cannot be parsed.
-std::map<std::string, std::string> definitionsUsedBy(const std::filesystem::path& path,
-                                                     const std::map<std::string, std::string>& definitions);
-
 /// What readScene finds in a file.
 struct SceneCheck {
   std::vector<Fault> faults;  ///< including those that options.lenient tolerates

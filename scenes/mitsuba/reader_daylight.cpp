@@ -120,6 +120,8 @@ bool DaylightReader::read(pugi::xml_node node, const Parameters& parameters, con
     parameters.colour("albedo", Rgb::Zero());
     parameters.warn("albedo", "albedo is ignored: Preetham's sky does not depend on the ground");
   }
+  if (context_.file.isOfToday())
+    context_.note(fmt::format("{}: the zenith is +y, as in Mitsuba 0.6; in Mitsuba 3 it is +z", describe(node)));
   // Nothing is stored before everything has been read, because an element that throws is read again.
   if (!any()) frame_ = toWorld;
   width_ = std::max(width_, width);

@@ -35,7 +35,7 @@ PixelFilter makeFilter(const std::string& type, const Parameters& parameters) {
   if (type == "lanczos") return {PixelFilter::Kind::lanczos, number("lobes", 3.0)};
   if (type == "mitchell") {
     const auto fraction = [&](const char* name) { return static_cast<float>(parameters.number(name, 1.0 / 3.0)); };
-    // Mitsuba 3 calls them A and B, 0.6 B and C.
+    // Mitsuba 3's manual calls them A and B; its code, like that of 0.6, reads B and C. Both are accepted.
     const bool new3 = parameters.has("a");
     return {PixelFilter::Kind::mitchell, number("radius", 2.0), 0.5f, fraction(new3 ? "a" : "b"),
             fraction(new3 ? "b" : "c")};

@@ -18,13 +18,15 @@ namespace {
 /// Reflectance that replaces a texture that cannot be read.
 constexpr float kFallbackGrey = 0.5f;
 
-/// The transform of texture coordinates: Mitsuba 0.6's four numbers, or Mitsuba 3's to_uv.
+/// The transform of texture coordinates: Mitsuba 0.6's numbers, of which uvscale is for both axes, or Mitsuba 3's
+/// to_uv.
 UvMap readUvMap(const Parameters& parameters) {
   if (!parameters.has("to_uv")) {
     const auto number = [&](const char* name, double fallback) {
       return static_cast<float>(parameters.number(name, fallback));
     };
-    return {Eigen::Matrix2f(Vec2(number("uscale", 1), number("vscale", 1)).asDiagonal()),
+    const double both = parameters.number("uvscale", 1);
+    return {Eigen::Matrix2f(Vec2(number("uscale", both), number("vscale", both)).asDiagonal()),
             Vec2(number("uoffset", 0), number("voffset", 0))};
   }
   const Eigen::Matrix4d m = parameters.transform("to_uv");

@@ -278,6 +278,9 @@ std::string SceneFile::substituted(const std::string& text, pugi::xml_node node)
     usedNames_.insert(name);
     i = end;
   }
+  substituted_ += result.size();
+  if (substituted_ > kLongestText)
+    fail(node, fmt::format("with all $names replaced, the values are longer than {} characters", kLongestText));
   return result;
 }
 

@@ -109,6 +109,7 @@ class SceneFile {
   pugi::xml_node scene_;
   std::map<std::string, std::string> values_;
   std::set<std::string> usedNames_;
+  std::size_t substituted_ = 0;  // characters of all values with $names
   std::map<std::string, pugi::xml_node> ids_;
 };
 

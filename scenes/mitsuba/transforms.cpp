@@ -1,6 +1,7 @@
 #include "scenes/mitsuba/transforms.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 
 #include <fmt/format.h>
@@ -38,10 +39,24 @@ Eigen::Matrix4d readRotation(const ReadContext& context, pugi::xml_node node) {
   return m;
 }
 
+/// The vector that Mitsuba 3 (today), or 0.6, takes as `up` if none is given: the first one of a frame about the unit
+/// vector n (Duff et al. 2017, "Building an Orthonormal Basis, Revisited", or the cross product with an axis).
+Eigen::Vector3d defaultUp(const Eigen::Vector3d& n, bool today) {
+  if (today) {
+    const double sign = std::copysign(1.0, n.z()), a = -1 / (sign + n.z());
+    return {1 + sign * n.x() * n.x() * a, sign * n.x() * n.y() * a, -sign * n.x()};
+  }
+  const Eigen::Vector3d across =
+      std::abs(n.x()) > std::abs(n.y()) ? Eigen::Vector3d(n.z(), 0, -n.x()) : Eigen::Vector3d(0, n.z(), -n.y());
+  return across.normalized().cross(n);
+}
+
 Eigen::Matrix4d readLookAt(const ReadContext& context, pugi::xml_node node) {
   checkAttributes(context, node, {"origin", "target", "up"});
-  const Eigen::Vector3d up = node.attribute("up") ? readTriple(context, node, "up") : Eigen::Vector3d::UnitY();
-  const auto m = lookAt(readTriple(context, node, "origin"), readTriple(context, node, "target"), up);
+  const Eigen::Vector3d origin = readTriple(context, node, "origin"), target = readTriple(context, node, "target");
+  Eigen::Vector3d up = node.attribute("up") ? readTriple(context, node, "up") : Eigen::Vector3d::Zero();
+  if (up.isZero(0)) up = defaultUp((target - origin).normalized(), context.file.isOfToday());
+  const auto m = lookAt(origin, target, up);
   if (!m) context.file.fail(node, "<lookat> has its target at its origin");
   return *m;
 }

@@ -47,6 +47,16 @@ TEST_CASE("fitter: a lower quality needs fewer components") {
   CHECK(coarse.components.size() < fine.components.size() / 2);
 }
 
+TEST_CASE("fitter: as many components as allowed are used where the quality requires them") {
+  const LobePtr lobe = conductorLobe(0.4, 0.4);
+  FitSettings settings = defaultFitSettings();
+  settings.quality = 1e-4f;
+  settings.components = 5;
+  CHECK(fitWithFewest(*lobe, direction(60), settings).mixture.size() == 5);
+  settings.components = 16;
+  CHECK(fitWithFewest(*lobe, direction(60), settings).mixture.size() > 8);
+}
+
 TEST_CASE("fitter: with default settings records are as good as weighted EM with eight components") {
   FitSettings settings = defaultFitSettings(), wem = settings;
   settings.reduction = wem.reduction = 0;

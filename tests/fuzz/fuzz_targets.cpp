@@ -23,6 +23,7 @@
 #include "schema/checkpoint_file.h"
 #include "schema/illumination_file.h"
 #include "schema/lobe_cache.h"
+#include "tests/fuzz/sampling_checks.h"
 
 namespace lobe::fuzz {
 namespace {
@@ -63,15 +64,8 @@ FuzzTarget ofPayload(const FileFormat& format, const FuzzTarget& read) {
   };
 }
 
-void readLobe(const fs::path& path) {
-  const LobeCache cache = LobeCache::open(path);
-  for (const CacheRecord& record : cache.records())
-    for (const CacheComponent& component : cache.components(record))
-      if (!(component.weight >= 0)) std::abort();
-}
-
 void readIllumination(const fs::path& path) {
-  Field::load(path);
+  checkSamplingOfField(Field::load(path));
 }
 
 void readCheckpoint(const fs::path& path) {
@@ -109,7 +103,7 @@ void readPicture(const fs::path& path) {
 }
 
 FuzzTargets makeTargets() {
-  const auto lobe = ofFile("a.lobe", readLobe), illum = ofFile("a.illum", readIllumination),
+  const auto lobe = ofFile("a.lobe", checkSamplingOfLobe), illum = ofFile("a.illum", readIllumination),
              checkpoint = ofFile("a.ckpt", readCheckpoint);
   FuzzTargets targets{
       {"lobe", lobe},

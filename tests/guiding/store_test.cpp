@@ -25,6 +25,7 @@ IlluminationRecord randomRecord(Rng& rng) {
   r.samples = 1000 * rng.uniform();
   r.bsdfFraction = 0.05f + 0.9f * rng.uniform();
   r.count = static_cast<std::int32_t>(9 * rng.uniform());
+  if (r.count == 0) r.background = 1;
   for (int k = 0; k < r.count; ++k)
     r.components[static_cast<std::size_t>(k)] = {1.0f / static_cast<float>(r.count),
                                                  rng.uniform() - 0.5f,

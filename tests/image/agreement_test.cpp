@@ -118,6 +118,8 @@ TEST_CASE("agreement: lobecompare writes the variance of merged pictures and tes
     CHECK(lobecompare("--merge " + merged + " --variance " + variance + " " + a + a).code == 1);
     CHECK(lobecompare("--variance " + variance + " " + a).code == 2);
     CHECK(lobecompare("--merge " + merged + " --variance " + merged + " " + a).code == 2);
+    CHECK(lobecompare("--merge " + merged + " --variance " + (folder / "." / "merged.exr").string() + " " + a).code ==
+          2);
     CHECK(lobecompare("--merge " + merged + " --variance v.png " + a).code == 2);
   }
   SECTION("agreement") {

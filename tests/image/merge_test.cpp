@@ -146,6 +146,9 @@ TEST_CASE("render: errors name the images that cannot be merged") {
     p.add(1, attributes);
     CHECK_THAT(p.fault(), Catch::Contains(p.paths[1].string() + ": does not say how many samples"));
   }
+  Pictures interrupted;
+  interrupted.add(1, {{"interrupted", "3 to 5 samples per pixel"}});
+  CHECK_THAT(interrupted.fault(), Catch::Contains("3 to 5 samples per pixel") && Catch::Contains("--resume"));
   for (const char* ranges : {"path 1 0", "path 1 4 4", "path 1 0 4 5", "path one 0 4", "path 1 0 4,"}) {
     Pictures p;
     p.add(1, {{"samples", 4.0}, {"sampleRanges", ranges}});

@@ -123,6 +123,7 @@ TEST_CASE("materials: principled glass conserves energy and is reciprocal up to 
       const auto s = glass->sample(wo, kUv, choice, rng.uniform2());
       const double value = s ? s->f.x() * std::abs(s->wi.z()) / s->pdf : 0.0;
       const bool crossed = s && s->wi.z() * wo.z() < 0.0f;
+      if (s) CHECK(s->eta == Approx(crossed ? eta : 1));
       energy.add(crossed ? value * eta * eta : value);
       reflected.add(crossed ? 0.0 : value);
       if (!crossed || i >= 200) continue;

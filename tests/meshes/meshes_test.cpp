@@ -697,6 +697,28 @@ TEST_CASE("scenes: makeCube creates a transformed cube") {
   }
 }
 
+TEST_CASE("scenes: a cube has the texture coordinates of Mitsuba's") {
+  const TriangleMesh mesh = makeCube({});
+  const auto uvAt = [&](const Vec3& normal, const Vec3& position) {
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i)
+      if (mesh.normals[i] == normal && mesh.positions[i] == position) return mesh.uvs[i];
+    return Vec2(-1, -1);
+  };
+  // One corner of each face at (0, 1), and its neighbour at (1, 1).
+  CHECK(uvAt({0, -1, 0}, {1, -1, -1}) == Vec2(0, 1));
+  CHECK(uvAt({0, -1, 0}, {1, -1, 1}) == Vec2(1, 1));
+  CHECK(uvAt({0, 1, 0}, {1, 1, -1}) == Vec2(0, 1));
+  CHECK(uvAt({0, 1, 0}, {-1, 1, -1}) == Vec2(1, 1));
+  CHECK(uvAt({1, 0, 0}, {1, -1, -1}) == Vec2(0, 1));
+  CHECK(uvAt({1, 0, 0}, {1, 1, -1}) == Vec2(1, 1));
+  CHECK(uvAt({0, 0, 1}, {1, -1, 1}) == Vec2(0, 1));
+  CHECK(uvAt({0, 0, 1}, {1, 1, 1}) == Vec2(1, 1));
+  CHECK(uvAt({-1, 0, 0}, {-1, -1, 1}) == Vec2(0, 1));
+  CHECK(uvAt({-1, 0, 0}, {-1, 1, 1}) == Vec2(1, 1));
+  CHECK(uvAt({0, 0, -1}, {1, 1, -1}) == Vec2(0, 1));
+  CHECK(uvAt({0, 0, -1}, {1, -1, -1}) == Vec2(1, 1));
+}
+
 TEST_CASE("scenes: makeDisk creates a transformed disk") {
   const Eigen::Affine3f transform =
       Eigen::Translation3f(1, 2, 3) * Eigen::AngleAxisf(0.7f, Vec3(1, 2, 2) / 3) * Eigen::Scaling(2.0f, 2.0f, 5.0f);

@@ -149,4 +149,11 @@ TEST_CASE("mixture: the largest random numbers choose a pair with nonzero weight
   const Mixture two{makeGaussian(1, {0, 0}, 0.1f, 0.1f, 0), makeGaussian(0, {50, 50}, 0.1f, 0.1f, 0)};
   const OwnedProduct product(one, 0, two);
   CHECK(product.sample(0x1.fffffep-1f, {0x1.fffffep-1f, 0x1.fffffep-1f}).norm() < 2);
+
+  // Weights whose sum depends on the order of the additions, before one of weight zero.
+  const Mixture light{makeGaussian(0x1p-24f, {0, 0}, 0.1f, 0.1f, 0), makeGaussian(0x1p-24f, {0, 0}, 0.1f, 0.1f, 0),
+                      makeGaussian(1, {0, 0}, 0.1f, 0.1f, 0), makeGaussian(0, {50, 50}, 0.1f, 0.1f, 0)};
+  const OwnedProduct uneven({}, 1, light);
+  for (const float choice : {0x1.fffffep-1f, 0x1.fffffcp-1f, 0x1.fffffap-1f})
+    CHECK(uneven.sample(choice, {0.5f, 0.5f}).norm() < 2);
 }

@@ -474,6 +474,25 @@ TEST_CASE("light paths: light whose solid angle a refracting surface changes giv
   CHECK(agree(path, renderBlocks(stage, stage.pathWithLight(4), {48, 12, 2000})));
 }
 
+TEST_CASE("light paths: light of delta lights through glass gives the image of bidirectional path tracing") {
+  // Camera paths do not find it. The camera does not see the slab, through which it would see light that only
+  // connections find.
+  const auto [name, light] = GENERATE(table<std::string, std::string>(
+      {{"directional", R"(<emitter type="directional"><vector name="direction" x="-0.3" y="0.4" z="-2"/>
+          <rgb name="irradiance" value="3, 2, 2.5"/></emitter>)"},
+       {"point", R"(<emitter type="point"><point name="position" x="1" y="-1" z="5"/>
+          <rgb name="intensity" value="90, 80, 70"/></emitter>)"},
+       {"spot", R"(<emitter type="spot"><transform name="to_world"><lookat origin="1, -1, 5" target="0.5, 0, 0"
+          up="0, 1, 0"/></transform><float name="cutoff_angle" value="35"/><rgb name="intensity" value="90, 80, 70"/>
+          </emitter>)"}}));
+  CAPTURE(name);
+  const Stage stage(sceneWith(kFloor + light + R"(<shape type="cube"><transform name="to_world">
+    <scale x="3" y="3" z="0.1"/><translate z="3.5"/></transform><bsdf type="dielectric"/></shape>)"));
+  const auto bdpt = renderBlocks(stage, stage.bdpt(), {48, 12, 1});
+  CHECK(agree(bdpt, renderBlocks(stage, stage.pathWithLight(), {48, 12, 1000})));
+  CHECK(agree(bdpt, renderBlocks(stage, stage.pathWithLight(0.25), {48, 24, 2000})));
+}
+
 TEST_CASE("light paths: guided emission of the environment gives the image of path tracing") {
   Scene scene = sceneWith(std::string(kFloor) + kLamp + R"(<shape type="sphere">
     <point name="center" x="0.8" y="-0.3" z="1"/><float name="radius" value="0.9"/><bsdf type="dielectric"/></shape>)");

@@ -247,6 +247,15 @@ struct UniformSampler {
   };
 };
 
+/// BSDF sampling, with the same estimate at all vertices.
+struct EstimatingSampler : BsdfSampler {
+  class Vertex : public BsdfSampler::Vertex {
+   public:
+    using BsdfSampler::Vertex::Vertex;
+    static std::optional<VertexEstimate> estimate() { return VertexEstimate{1, 0}; }
+  };
+};
+
 class UniformIntegrator : public Integrator {
  public:
   UniformIntegrator(const RenderScene& scene, float fault, const SampleCountModel* counts = nullptr)
@@ -303,6 +312,32 @@ TEST_CASE("render: estimates are unbiased for any counts of samples") {
     counting.radiance(kLookIntoRoom, rng, split);
   }
   CHECK(split.segments > 1.3 * plain.segments);
+}
+
+TEST_CASE("render: paths without a finite value do not disturb the learning of counts") {
+  // In a closed box whose walls reflect twice the light, a few paths in a thousand exceed the range of single
+  // precision.
+  Scene scene;
+  addEmitter(scene, box({-1, -1, -1}, {1, 1, 1}, true), 0.5f, addMaterial(scene, std::make_shared<Diffuse>(2.0f)));
+  const RenderScene ready(scene);
+  const PathOptions options;
+  const EstimatingSampler sampler;
+  const PathLoop loop(ready, options, sampler);
+  const Ray inside{Vec3(0, 0, 0), Vec3(0.6f, 0.8f, 0)};
+  PathLog log;
+  PathStatistics statistics;
+  Sampler rng(3);
+  int invalid = 0;
+  for (int i = 0; i < 5000; ++i) {
+    loop.log(inside, rng, log);
+    if (!loop.radiance(inside, rng, statistics).isFinite().all()) ++invalid;
+  }
+  REQUIRE(invalid > 0);
+  CHECK(log.paths.size() > 4000);
+  CHECK(log.paths.size() < 5000);
+  CHECK(std::ranges::all_of(log.paths, [](const PathLog::Path& path) { return std::isfinite(path.radiance); }));
+  CHECK(!log.vertices.empty());
+  CHECK(log.vertices.size() == log.paths.back().end);
 }
 
 TEST_CASE("render: an image depends on the seed but not on threads or waves") {

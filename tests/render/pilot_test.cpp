@@ -82,3 +82,25 @@ TEST_CASE("pilot: works for images smaller than a tile, and for black ones") {
   const std::array<const Integrator*, 1> dark{&black};
   CHECK(comparePilots(cameraOf(8, 8), dark, {})[0].variance == 0);
 }
+
+TEST_CASE("pilot: product is chosen if it is better, with a margin where path has little noise or time is short") {
+  const auto comparison = [](double variance, double ratio, bool brief = false) {
+    // Inefficiency is variance times cost.
+    return compared({variance, 2}, {0.5 * variance, 4 * ratio}, brief);
+  };
+  CHECK(comparison(1, 0.9).ratio() == Approx(0.9));
+  for (const double variance : {0.001, 0.1}) {
+    CHECK(comparison(variance, 0.7).prefersProduct());
+    CHECK_FALSE(comparison(variance, 0.7).isUndecided());
+    CHECK_FALSE(comparison(variance, 1.05).prefersProduct());
+    CHECK_FALSE(comparison(variance, 1.5).isUndecided());
+  }
+  CHECK_FALSE(comparison(0.001, 0.9).prefersProduct());
+  CHECK_FALSE(comparison(0.001, 0.9).isUndecided());
+  CHECK(comparison(0.1, 0.9).prefersProduct());
+  CHECK(comparison(0.1, 0.9).isUndecided());
+  CHECK(comparison(0.1, 1.05).isUndecided());
+  CHECK(comparison(0.1, 0.7, true).prefersProduct());
+  CHECK_FALSE(comparison(0.1, 0.9, true).prefersProduct());
+  CHECK_FALSE(comparison(0.1, 0.9, true).isUndecided());
+}

@@ -399,6 +399,9 @@ TEST_CASE("scenes: bitmaps with wrap modes and scales and filters and encodings"
   CHECK(lookUp(nearest + "<string name=\"wrapModeU\" value=\"clamp\"/>", {7.2f, 0.5f}) == 1.0f);
   CHECK(lookUp(nearest, {7.2f, 0.5f}) == 0.0f);
   CHECK(lookUp(nearest + "<float name=\"uscale\" value=\"3\"/>", {0.25f, 0.5f}) == 1.0f);
+  CHECK(lookUp(nearest + "<float name=\"uvscale\" value=\"3\"/>", {0.25f, 0.5f}) == 1.0f);
+  CHECK(lookUp(nearest + "<float name=\"uvscale\" value=\"5\"/><float name=\"uscale\" value=\"3\"/>", {0.25f, 0.5f}) ==
+        1.0f);
   CHECK(lookUp(nearest + "<float name=\"uoffset\" value=\"0.5\"/>", {0.2f, 0.5f}) == 1.0f);
   CHECK(lookUp(nearest + "<transform name=\"to_uv\"><scale x=\"3\"/></transform>", {0.25f, 0.5f}) == 1.0f);
   CHECK(lookUp(nearest + "<transform name=\"to_uv\"><translate x=\"0.5\"/></transform>", {0.2f, 0.5f}) == 1.0f);

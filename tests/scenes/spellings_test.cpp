@@ -233,6 +233,13 @@ TEST_CASE("scenes: transforms with degenerate up vectors and rounding errors are
   };
   CHECK(centre("<lookat origin=\"1, 2, 3\" target=\"1, 9, 3\"/>") == Vec3(1, 2, 3));
   CHECK(centre("<lookat origin=\"1, 2, 3\" target=\"1, 2, 9\" up=\"0, 0, 1\"/>") == Vec3(1, 2, 3));
+  // Without an up vector, that of Mitsuba: here, x.
+  const Scene scene = readBody(
+      "<shape type=\"rectangle\"><transform name=\"to_world\"><lookat origin=\"0, 3, 0\" "
+      "target=\"0, 0, 0\"/></transform></shape>");
+  const auto& corners = std::get<TriangleMesh>(scene.shapes[0].geometry).positions;
+  CHECK((corners[1] - corners[0] - Vec3(0, 0, -2)).norm() < 1e-5f);
+  CHECK((corners[3] - corners[0] - Vec3(2, 0, 0)).norm() < 1e-5f);
   CHECK(centre("<matrix value=\"1 0 0 4 0 1 0 5 0 0 1 6 0 1e-8 0 0.9999999\"/>") == Vec3(4, 5, 6));
   CHECK_THAT(faultOf("<shape type=\"sphere\"><transform name=\"to_world\"><lookat origin=\"1 2 3\" target=\"1 2 3\"/>"
                      "</transform></shape>"),

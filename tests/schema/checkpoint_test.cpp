@@ -25,7 +25,7 @@ Content smallFile() {
   Content c;
   c.info = {
       {{"--seed", "7"}, {"the size", "2x1"}}, 2, 1, 1.5, 2.5, {{0.5, 1000, 20, -1.25}}, 0.25, true, {3, 4, 5}, {}, {}};
-  c.info.pilot = {1, 2, 3, 4, 5};
+  c.info.pilot = {1, 2, 3, 4, 5, 6};
   c.info.lightPathTrial = {1, 2, 3, 4, 5, 6, 7};
   c.pixels = {{{1, 2, 3}, {4, 5, 6}, 7, 1}, {{0, 0, 0}, {0, 0, 0}, 0, 0}};
   c.illumination = {std::byte{1}, std::byte{2}};
@@ -66,7 +66,7 @@ TEST_CASE("schema: a checkpoint reads back as written") {
          info.passes[0].logLikelihood == -1.25));
   REQUIRE((info.pilot && info.lightPathTrial));
   CHECK((info.pilot->pathVariance == 1 && info.pilot->pathCost == 2 && info.pilot->productVariance == 3 &&
-         info.pilot->productCost == 4 && info.pilot->seconds == 5));
+         info.pilot->productCost == 4 && info.pilot->limit == 5 && info.pilot->seconds == 6));
   const StoredLightPathTrial& trial = *info.lightPathTrial;
   CHECK((trial.variance == 1 && trial.cost == 2 && trial.pathsPerPixel == 3 && trial.secondMoment == 4 &&
          trial.left == 5 && trial.costWithLight == 6 && trial.seconds == 7));
@@ -82,9 +82,9 @@ TEST_CASE("schema: the layout of checkpoints matches the FlatBuffers schema") {
   CHECK((pixel.count() == 7 && pixel.dropped() == 8));
   const auto pass = std::bit_cast<fb::TrainingPass>(StoredPass{1, 2, 3, 4});
   CHECK((pass.seconds() == 1 && pass.particles() == 2 && pass.records() == 3 && pass.log_likelihood() == 4));
-  const auto pilot = std::bit_cast<fb::Pilot>(StoredPilot{1, 2, 3, 4, 5});
+  const auto pilot = std::bit_cast<fb::Pilot>(StoredPilot{1, 2, 3, 4, 5, 6});
   CHECK((pilot.path_variance() == 1 && pilot.path_cost() == 2 && pilot.product_variance() == 3 &&
-         pilot.product_cost() == 4 && pilot.seconds() == 5));
+         pilot.product_cost() == 4 && pilot.limit() == 5 && pilot.seconds() == 6));
   const auto trial = std::bit_cast<fb::LightPathTrial>(StoredLightPathTrial{1, 2, 3, 4, 5, 6, 7});
   CHECK((trial.variance() == 1 && trial.cost() == 2 && trial.paths_per_pixel() == 3 && trial.second_moment() == 4 &&
          trial.left() == 5 && trial.cost_with_light() == 6 && trial.seconds() == 7));

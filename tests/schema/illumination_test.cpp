@@ -152,7 +152,9 @@ TEST_CASE("schema: invalid values in illumination files are rejected") {
       {"negative irradiance", [](Content& c) { c.records[1].irradiance = -1; }},
       {"not finite", [&](Content& c) { c.records[1].irradiance = infinity; }},
       {"number of samples", [](Content& c) { c.records[1].samples = -1; }},
+      {"no components", [](Content& c) { c.records[1].count = 0, c.records[1].background = 0.9f; }},
       {"BSDF sampling fraction", [](Content& c) { c.records[1].bsdfFraction = 0; }},
+      {"BSDF sampling fraction", [](Content& c) { c.records[1].bsdfFraction = 1e-6f; }},
       {"BSDF sampling fraction", [](Content& c) { c.records[1].bsdfFraction = 1; }},
       {"BSDF sampling fraction", [&](Content& c) { c.records[0].bsdfFraction = nan; }},
       {"number of components", [](Content& c) { c.records[1].count = kMaxStoredComponents + 1; }},
@@ -160,6 +162,11 @@ TEST_CASE("schema: invalid values in illumination files are rejected") {
       {"components out of range", [](Content& c) { c.records[0].first = 0xffffffffu; }},
       {"sum to one", [](Content& c) { c.components[1].weight = 0.3f; }},
       {"not positive definite", [](Content& c) { c.components[1].covXX = -0.01f; }},
+      {"not positive definite",
+       [](Content& c) {
+         c.components[1].covXX = c.components[1].covYY = 1e-30f;
+         c.components[1].covXY = 0;
+       }},
       {"unit of length", [](Content& c) { c.info.unit = 0; }},
       {"unit of length", [&](Content& c) { c.info.unit = infinity; }},
       {"unit of length", [](Content& c) { c.info.unit = c.records[0].radius = c.records[1].radius = 1e-40f; }},

@@ -237,6 +237,18 @@ def check_frames(tools, folder, cluster):
         assert (folder / f"frame-00{frame}.exr").read_bytes() == whole.read_bytes(), f"frame {frame} differs"
 
 
+def check_camera(tools, folder, cluster):
+    """A value that only the file of the camera uses, which lobefit accepts; and options that are refused before anything is submitted."""
+    camera = folder / "camera.xml"
+    camera.write_text('<scene version="3.0.0"><sensor type="perspective"><float name="fov" value="$angle"/></sensor></scene>')
+    farm = [ROOT / "scripts/farm", ROOT / "scenes/jewelry.xml", "-o", folder / "camera.exr", "--spp", 1, "--parts", 1, "--tools", tools]
+    script = cluster.run(*farm, "-D", "angle=40", "--dry-run", "--", "--camera", camera)
+    fit = next(line for line in script.splitlines() if line.startswith("run ") and "lobefit" in line)
+    subprocess.run(["bash", "-c", fit.removeprefix("run ").replace("$threads", "1") + " --check"], check=True, capture_output=True)
+    refused = subprocess.run(texts(*farm, "--dry-run", "--", "--gradients", "l2"), capture_output=True, text=True)
+    assert refused.returncode == 2 and "--gradients" in refused.stderr, refused.stderr
+
+
 def check_failure(tools, folder, cluster):
     """A job that always fails ends the jobs that depend on it."""
     farm = cluster.popen([ROOT / "scripts/farm", ROOT / "scenes/jewelry.xml", "-o", folder / "failure.exr", "--spp", 4, "--parts", 2, "-D", "width=none",
@@ -256,6 +268,7 @@ def main():
     with tempfile.TemporaryDirectory(prefix="lobe-farm-") as name:
         folder = pathlib.Path(name)
         with Cluster(folder / "slurm") as cluster:
+            check_camera(tools, folder, cluster)
             check_failure(tools, folder, cluster)
             check_frames(tools, folder, cluster)
             check_picture(tools, folder, cluster)

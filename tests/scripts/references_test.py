@@ -35,10 +35,13 @@ def complete_runs(out):
 
 
 def check_agreement(tools, out):
+    # A scene of an earlier command, whose methods disagreed.
+    out.mkdir()
+    (out / "references.json").write_text(json.dumps([{"scene": "other", "reference": None}]))
     options = ("--spp", "16", "--size", "16x16", "--methods", f"product=--integrator product {QUICK}", "path")
     text, _ = run(tools, out, *options)
     assert "room: the methods agree" in text, text
-    result = json.loads((out / "references.json").read_text())[0]
+    result = json.loads((out / "references.json").read_text())[1]
     assert result["test"]["agree"] and result["reference"] in ("product", "path"), result
     assert result["methods"]["path"]["samples"] == 4 * 16, result
     for name in ("room.exr", "room-variance.exr", "room/product.exr", "room/path-variance.exr"):
@@ -52,7 +55,8 @@ def check_agreement(tools, out):
 
 
 def check_disagreement(tools, out):
-    text, _ = run(tools, out, "--spp", "16", "--size", "16x16", "--methods", "path", "short=--integrator path --max-depth 2", code=1)
+    text, _ = run(tools, out, "--spp", "16", "--size", "16x16", "--methods", "path",
+                  "short=--integrator path --max-depth 2 --gradients l2", code=1)
     assert "THE METHODS DISAGREE" in text, text
     assert json.loads((out / "references.json").read_text())[0]["reference"] is None
     assert not (out / "room.exr").exists(), "a reference is made of methods that disagree"

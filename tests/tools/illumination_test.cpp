@@ -153,10 +153,12 @@ TEST_CASE("loberender: the sensor can come from another file") {
     CHECK_THAT(fault(folder, use + "camera.xml", 1), Catch::Contains("camera.xml:1:") && Catch::Contains("$fov"));
     CHECK_THAT(fault(folder, use + "camera.xml -D fov=50 -D angle=1", 1), Catch::Contains("$angle"));
     CHECK_THAT(fault(folder, use + "camera.xml -D fov=50 --stats camera.xml", 2), Catch::Contains("camera.xml"));
-    // lobefit does not read the camera, so its command has no definitions for it.
+    // lobefit accepts the definitions of the camera, too.
     const std::string line =
         fault(folder, "loberender scene.xml -o c.exr --integrator product --spp 1 --camera camera.xml -D fov=50", 1);
-    CHECK_THAT(line, Catch::Contains("run: lobefit") && !Catch::Contains("fov"));
+    CHECK_THAT(line, Catch::Contains("run: lobefit") && Catch::Contains("--camera camera.xml -D fov=50"));
+    CHECK(folder.run("lobefit scene.xml --check --camera camera.xml -D fov=50").code == 0);
+    CHECK(folder.run("lobefit scene.xml --check -D fov=50").code == 1);
   }
 }
 

@@ -13,6 +13,7 @@
 #include <catch2/catch.hpp>
 
 #include "runtime/image/image_output.h"
+#include "runtime/render/integrators/pilot.h"
 #include "schema/lobe_cache.h"
 #include "tests/support/json.h"
 #include "tests/support/loberender_test_tools.h"
@@ -249,6 +250,13 @@ TEST_CASE("loberender: bidirectional pictures do not depend on the number of thr
   CHECK(s.at("nonfinite_samples") == 0);
   CHECK(folder.run("loberender scene.xml --integrator path --spp 1 -o a.exr --guide product")
             .error.find("--integrator path ignores --guide") != std::string::npos);
+  const std::string unused = folder
+                                 .run(
+                                     "loberender scene.xml --integrator bdpt --spp 1 -o a.png --shadow-surfaces 2 "
+                                     "--aov albedo --exr-type half")
+                                 .error;
+  CHECK_THAT(unused, Catch::Contains("--integrator bdpt ignores --shadow-surfaces"));
+  CHECK_THAT(unused, Catch::Contains("--aov has no effect") && Catch::Contains("--exr-type has no effect"));
 }
 
 TEST_CASE("loberender: pictures from gradients do not depend on the number of threads and are not negative") {
@@ -363,9 +371,12 @@ TEST_CASE("loberender: statistics and convergence and images of a run") {
   SECTION("statistics") {
     const auto s = parseJson(folder.bytes("s.json"));
     const double training = s.at("seconds_training"), rendering = s.at("seconds_rendering");
-    const double path = s.at("pilot").at("path").at("variance"), product = s.at("pilot").at("product").at("variance");
-    const double pathCost = s.at("pilot").at("path").at("cost"), productCost = s.at("pilot").at("product").at("cost");
-    CHECK(s.at("integrator") == (product * productCost < 0.8 * path * pathCost ? "product" : "path"));
+    const auto result = [&](const char* name) {
+      const auto& one = s.at("pilot").at(name);
+      return PilotResult{one.at("variance"), one.at("cost")};
+    };
+    const PilotComparison pilot = compared(result("path"), result("product"), true);
+    CHECK(s.at("integrator") == (pilot.prefersProduct() ? "product" : "path"));
     CHECK(training > 0);
     CHECK(rendering > 0);
     const double preparing = s.at("seconds_learning_lights").get<double>() +

@@ -9,7 +9,13 @@
 //
 //   float choice = uniform();
 //   const Strategy strategy = distribution.choose(choice);
-//   wi = strategy == Strategy::bsdf ? bsdf.sample(choice, u) : distribution.sample(strategy, choice, u)->wi;
+//   if (strategy == Strategy::bsdf) {
+//     wi = bsdf.sample(choice, u);
+//   } else if (const auto sample = distribution.sample(strategy, choice, u)) {
+//     wi = sample->wi;
+//   } else {
+//     return 0;  // a sample of value zero
+//   }
 //   pdf = distribution.bsdfProbability() * bsdf.pdf(wi) + distribution.guidedPdf(wi);
 //
 // Estimates with this density are unbiased whatever the field has learnt, because the probability of BSDF sampling is

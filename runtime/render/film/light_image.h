@@ -14,8 +14,7 @@ namespace lobe {
 struct Splat {
   Vec2 film;
   Rgb value;
-  /// The sum over the other techniques of their squared densities relative to this one, from which the multiple
-  /// importance weight 1 / (1 + others) in the value follows.
+  /// Σ (p_other / p_this)² over the other techniques. The value already contains the weight 1 / (1 + others).
   double others = 0;
 };
 

@@ -71,10 +71,10 @@ std::optional<BsdfSample> sampleBsdf(const SurfaceHit& hit, float choice, const 
 std::optional<DeltaSample> sampleDelta(const SurfaceHit& hit, float choice);
 std::optional<DeltaTransmission> deltaTransmission(const SurfaceHit& hit);
 
-/// For light that arrives along hit.wo, as on a path from a light: the BSDF for radiance that leaves in the direction
-/// of `seen.wo`, times |ω·Ns|/|ω·Ng| for the shading and the geometric normal and the direction ω of hit.wo, the
-/// correction without which paths from lights and from the camera would not agree (Veach 1997, Section 5.3.2). seen:
-/// asSeenFrom the direction in which the light leaves. Zero if a direction is on different sides of the two normals.
+/// The BSDF on a path from a light, which comes from hit.wo and leaves towards seen.wo, where seen is asSeenFrom that
+/// direction: f(seen.wo, ω) |ω·Ns| / |ω·Ng| with the world-space direction ω of hit.wo and the shading and geometric
+/// normals. Without the factor, paths from lights and from the camera would not agree (Veach 1997, Section 5.3.2).
+/// Zero if a direction is on different sides of the two normals.
 Rgb evalAdjointBsdf(const SurfaceHit& hit, const SurfaceHit& seen);
 /// Like sampleDelta for such light: the weight is that of flux, with the same correction.
 std::optional<DeltaSample> sampleAdjointDelta(const SurfaceHit& hit, float choice);

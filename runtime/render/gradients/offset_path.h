@@ -4,10 +4,10 @@
 // directions, over solid angle, in which they leave the vertices where they were not scattered by a delta component.
 //
 // At a vertex, the offset path
-//   - is connected to the next vertex of the base path if both scatter broadly there (kBroad) and the next vertex is
-//   not
-//     purely specular; light at infinity is next in the same direction;
-//   - otherwise copies the half vector of the base path, or its delta component.
+// - is connected to the next vertex of the base path if both paths scatter broadly there (kBroad) and the next vertex
+// is
+//   not purely specular (light at infinity is in the same direction for both);
+// - otherwise copies the half vector of the base path, or its delta component.
 // After a connection both paths have the same vertices. If the shift does not lead back from the offset path to the
 // base path, or if the offset path has no light, there is no offset path: the base path contributes to the difference
 // of the pixels with its full weight.
@@ -72,8 +72,7 @@ struct Contribution {
   double group2 = 1;  ///< sum of the squared densities of the techniques that shift the path alike, this one included
   double total2 = 1;  ///< sum of the squared densities of all techniques
 
-  /// With a group of its own, with the squared density own2.
-  Contribution(const Rgb& v, double own2, double total) : value(v), group2(own2), total2(total) {}
+  Contribution(const Rgb& v, double group, double total) : value(v), group2(group), total2(total) {}
   /// The value of a base path with its multiple importance weight.
   Rgb weighted() const { return value * static_cast<float>(1.0 / total2); }
 };

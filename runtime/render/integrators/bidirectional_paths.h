@@ -157,7 +157,7 @@ class BidirectionalPaths {
     if (!scene_.visibleToCamera(vertex.hit, view->ray, options_.emitterVisibility)) return std::nullopt;
     const float density = view->density * std::abs(vertex.hit.normal.dot(direction));
     const double others =
-        squared(density / lightPaths()) * vertex.weights.with(pdfFrom(cameraGuide_, seen, vertex.hit));
+        squared(density / lightPaths()) * vertex.weights.sumOfOthers(reversePdf(cameraGuide_, seen, vertex.hit));
     const Rgb value = vertex.throughput * scattered * static_cast<float>(density / lightPaths());
     return ViewedVertex{*view, seen, value, density, others};
   }
@@ -167,15 +167,16 @@ class BidirectionalPaths {
     Rgb value;        ///< without the throughput of the camera path
     SurfaceHit seen;  ///< the light vertex as the camera path sees it
     // Sums of squared densities relative to the connection's: of the techniques with more vertices on the camera path;
-    // and of those with fewer, without the factor PartialWeights::with(reverse) of the camera path.
+    // and of those with fewer, without the factor PartialWeights::sumOfOthers(reverse) of the camera path.
     double longer, shorter;
     float reverse;
 
     /// The sum over all techniques, this one included, whose shorter camera paths are in `camera`.
-    double total(const PartialWeights& camera) const { return 1.0 + longer + shorter * camera.with(reverse); }
+    double total(const PartialWeights& camera) const { return 1.0 + longer + shorter * camera.sumOfOthers(reverse); }
   };
   /// hit: the vertex of the camera path, where sampler samples the non-delta component, with the probability `smooth`.
-  /// statistics: count the shadow ray; nullptr: they are known to see each other. nullopt: it contributes nothing.
+  /// statistics: counts the shadow ray that tests visibility; nullptr: the vertices are known to see each other, and no
+  /// ray is traced. nullopt: it contributes nothing.
   std::optional<Connection> connection(const SurfaceHit& hit, const typename CameraGuide::Vertex& sampler, float smooth,
                                        const LightVertex& light, PathStatistics* statistics) const {
     const Vec3 between = light.hit.position - hit.position;
@@ -197,24 +198,25 @@ class BidirectionalPaths {
     const float toLight = std::abs(light.hit.normal.dot(direction)) / distance2;
     const float toCamera = std::abs(hit.normal.dot(direction)) / distance2;
     const SurfaceHit fromLight = asSeenFrom(scene_.scene, hit, direction);
-    return Connection{
-        f * scattered * light.throughput * (std::abs(wi.z()) * toLight), seen,
-        squared(smooth * sampler.pdf(wi) * toLight) * light.weights.with(pdfFrom(cameraGuide_, seen, light.hit)),
-        squared(light.pdf(-direction) * toCamera), pdfFrom(lightGuide_, fromLight, hit)};
+    return Connection{f * scattered * light.throughput * (std::abs(wi.z()) * toLight), seen,
+                      squared(smooth * sampler.pdf(wi) * toLight) *
+                          light.weights.sumOfOthers(reversePdf(cameraGuide_, seen, light.hit)),
+                      squared(light.pdf(-direction) * toCamera), reversePdf(lightGuide_, fromLight, hit)};
   }
 
   /// The connection of a vertex of a camera path with a point of a light.
   struct LightConnection {
-    Vec3 wi;          ///< local in the frame of the vertex
-    Rgb value;        ///< times the density of the point, without the throughput of the camera path
-    double density;   ///< of the point, as LightSelection::pdf of a photon
-    double hits;      ///< density with which the camera path finds the light
-    double emission;  ///< with which a light path arrives, without the squared factor PartialWeights::with(reverse)
+    Vec3 wi;         ///< local in the frame of the vertex
+    Rgb value;       ///< times the density of the point, without the throughput of the camera path
+    double density;  ///< of the point, as LightSelection::pdf of a photon
+    double hits;     ///< density with which the camera path finds the light
+    double
+        emission;  ///< with which a light path arrives, without the squared factor PartialWeights::sumOfOthers(reverse)
     float reverse;
 
     /// The sum of the squared densities of all techniques whose shorter camera paths are in `camera`.
     double total(const PartialWeights& camera) const {
-      return squared(density) + squared(hits) + squared(emission) * camera.with(reverse);
+      return squared(density) + squared(hits) + squared(emission) * camera.sumOfOthers(reverse);
     }
   };
   /// As `connection`, for a light sample.
@@ -237,7 +239,7 @@ class BidirectionalPaths {
                            light.pdf * unit,
                            light.delta ? 0.0 : smooth * sampler.pdf(wi),
                            emissionDensity(hit, light),
-                           pdfFrom(lightGuide_, seen, hit)};
+                           reversePdf(lightGuide_, seen, hit)};
   }
 
   /// The density with which a light path arrives at a hit from a light sample, in the measure of LightConnection.
@@ -245,12 +247,6 @@ class BidirectionalPaths {
     const bool onSurface = light.source && !light.delta;
     const double cosineAtLight = onSurface ? std::abs(light.source->normal.dot(light.wi)) : 1.0f;
     return scene_.lights.photonDensity(light) * std::abs(hit.normal.dot(light.wi)) / cosineAtLight;
-  }
-
-  /// The density with which paths of a guide that arrive along seen.wo continue along hit.wo; both are the same point.
-  template <class Guide>
-  static float pdfFrom(const Guide& guide, const SurfaceHit& seen, const SurfaceHit& hit) {
-    return reversePdf(guide, seen, hit);
   }
 
  private:
@@ -296,10 +292,11 @@ class BidirectionalPaths {
   /// receiver as on a camera path, which arrives on the same side of a surface that only reflects.
   PartialWeights withNextEvent(const Walk& walk, const SurfaceHit& hit) const {
     PartialWeights weights = walk.weights;
-    if (walk.passage.found(walk.photon->far)) {
+    const bool fromEnvironment = walk.photon->light < 0;
+    if (walk.passage.found(fromEnvironment)) {
       const LightSelection nextEvent = scene_.lights.at(hit);
-      weights.connect(walk.photon->light < 0 ? nextEvent.environmentPdf(hit.woWorld)
-                                             : nextEvent.pdf(*walk.photon, walk.passage.distance + hit.distance));
+      weights.connect(fromEnvironment ? nextEvent.environmentPdf(hit.woWorld)
+                                      : nextEvent.pdf(*walk.photon, walk.passage.distance + hit.distance));
     } else {
       weights.disconnect();
     }
@@ -398,7 +395,7 @@ class BidirectionalPaths {
     if (!(f.maxCoeff() > 0.0f)) return;
     const SurfaceHit seen = asSeenFrom(scene_.scene, hit, photon.direction);
     const double weight =
-        vertex.weights.ofMerging(pdfFrom(lightGuide_, seen, hit), photon.weights, vertex.pdf(photon.direction));
+        vertex.weights.ofMerging(reversePdf(lightGuide_, seen, hit), photon.weights, vertex.pdf(photon.direction));
     // The density of photons over area contains the cosine to the geometric normal where they arrived.
     const float cosine = std::abs(photon.normal.dot(photon.direction));
     contribute(sample,
@@ -453,12 +450,12 @@ class BidirectionalPaths {
     walk.weights = vertex.weights;
     rememberDelta<transport>(walk, false);
     if constexpr (transport == Transport::flux) {
-      walk.weights.scatter(pdf, pdfFrom(cameraGuide_, seen, hit), cosine);
+      walk.weights.scatter(pdf, reversePdf(cameraGuide_, seen, hit), cosine);
       if (tracing_) walk.weights.disconnect();
       walk.passage.scatter();
       return continueAlong(walk, hit, direction, evalAdjointBsdf(hit, seen) * (cosine / pdf));
     } else {
-      walk.weights.scatter(pdf, pdfFrom(lightGuide_, seen, hit), cosine);
+      walk.weights.scatter(pdf, reversePdf(lightGuide_, seen, hit), cosine);
       walk.eta2 *= squaredEta(scattered->eta);
       return continueAlong(walk, hit, direction, scattered->f * (std::abs(scattered->wi.z()) / pdf));
     }

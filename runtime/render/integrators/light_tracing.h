@@ -33,8 +33,8 @@ struct LightTracing {
   PhotonEmission emission;  ///< where they start
 };
 
-/// The density with which paths of a guide (path_loop.h) that arrive along seen.wo continue along hit.wo; both are the
-/// same point.
+/// The density with which a path of the guide (path_loop.h) that comes from the direction seen.wo continues in the
+/// direction hit.wo. Both hits are the same point, seen from two directions.
 template <class Guide>
 float reversePdf(const Guide& guide, const SurfaceHit& seen, const SurfaceHit& hit) {
   if (!sidesAgree(seen, seen.woWorld, seen.wo)) return 0.0f;
@@ -105,7 +105,7 @@ class LightPaths {
     const double emission = emission_.density(light, arriving.last) * std::abs(hit.normal.dot(light.wi)) /
                             (cosineAtLight * squared(arriving.eta));
     if (!(emission > 0)) return 0;
-    return static_cast<float>(squared(emission / density) * weight->with(reverse(*weight, hit, light.wi)));
+    return static_cast<float>(squared(emission / density) * weight->sumOfOthers(reverse(*weight, hit, light.wi)));
   }
 
  private:

@@ -43,7 +43,7 @@ class PartialWeights {
   /// The vertex scatters in a direction with a cosine. pdf: density of the direction; reverse: density with which paths
   /// from the other end sample the direction back along the segment; both over solid angle.
   void scatter(float pdf, float reverse, float cosine) {
-    vc_ = squared(static_cast<double>(cosine) / pdf) * with(reverse);
+    vc_ = squared(static_cast<double>(cosine) / pdf) * sumOfOthers(reverse);
     vcm_ = 1.0 / squared(pdf);
   }
   /// The vertex scatters by a delta component. arriving: cosine of the segment at the vertex; eta: index of refraction
@@ -67,15 +67,15 @@ class PartialWeights {
   /// Excludes all techniques that would make the subpath up to here from its other end.
   void exclude() { vc_ = 0.0; }
 
-  /// The sum over the techniques in which this vertex, and perhaps more, belongs to the other subpath, divided by the
-  /// squared density with which the other subpath samples this vertex. reverse: as in scatter, at this vertex.
-  double with(float reverse) const { return merging_ + vcm_ + vc_ * squared(reverse); }
+  /// Sum of the squared densities of the techniques in which the other subpath contains this vertex, divided by the
+  /// squared density with which that subpath samples it. reverse: as in scatter, at this vertex.
+  double sumOfOthers(float reverse) const { return merging_ + vcm_ + vc_ * squared(reverse); }
 
-  /// Whether `with` depends on its argument.
+  /// Whether sumOfOthers depends on its argument.
   bool dependsOnReverse() const { return vc_ > 0.0; }
 
-  /// The weight of merging this vertex of a camera path with one of a light path; reverse, lightReverse: as in `with`
-  /// for either. Must not be called if vertices are not merged.
+  /// The weight of merging this vertex of a camera path with one of a light path; reverse, lightReverse: as in
+  /// sumOfOthers for either. Must not be called if vertices are not merged.
   double ofMerging(float reverse, const PartialWeights& light, float lightReverse) const {
     const double others = vcm_ + vc_ * squared(reverse) + light.vcm_ + light.vc_ * squared(lightReverse);
     return merging_ / (merging_ + others);

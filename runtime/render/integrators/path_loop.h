@@ -72,8 +72,14 @@ class PathLoop {
     PathStatistics statistics;
     Path path{cameraRay, &rng, &statistics};
     path.log = &log;
+    const std::size_t begin = log.vertices.size();
     follow(path);
-    log.paths.push_back({log.vertices.size(), luminance(path.found.total()), static_cast<float>(statistics.cost())});
+    const float radiance = luminance(path.found.total());
+    // As in a film, a path without a finite value is left out.
+    if (std::isfinite(radiance))
+      log.paths.push_back({log.vertices.size(), radiance, static_cast<float>(statistics.cost())});
+    else
+      log.vertices.erase(log.vertices.begin() + static_cast<std::ptrdiff_t>(begin), log.vertices.end());
   }
 
  private:
@@ -195,7 +201,8 @@ class PathLoop {
 
   bool logVertex(Path& path, const std::optional<VertexEstimate>& estimate) const {
     const float throughput = luminance(path.throughput);
-    if (!estimate || !(throughput * estimate->reflectedRadiance > 0)) return false;
+    const float expected = estimate ? throughput * estimate->reflectedRadiance : 0.0f;
+    if (!(expected > 0) || !std::isfinite(expected)) return false;
     path.log->vertices.push_back(
         {*estimate, throughput, luminance(path.found.total()), 0, static_cast<float>(path.statistics->cost()), 0});
     return true;

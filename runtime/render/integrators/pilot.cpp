@@ -79,6 +79,11 @@ PixelPair renderPair(const RayCamera& camera, const Integrator& integrator, std:
 
 }  // namespace
 
+PilotComparison compared(const PilotResult& path, const PilotResult& product, bool brief) {
+  constexpr double kNoisy = 0.03;  // below this variance, stratification matters
+  return {path, product, path.variance > kNoisy && !brief ? 1.0 : PilotComparison::kClearlyBetter};
+}
+
 std::vector<PilotResult> comparePilots(const RayCamera& camera, std::span<const Integrator* const> integrators,
                                        const PilotOptions& options) {
   const Tiling tiling(camera, options);

@@ -34,6 +34,28 @@ struct PilotResult {
   double inefficiency() const { return variance * cost; }
 };
 
+/// A choice between path tracing and product sampling.
+struct PilotComparison {
+  PilotResult path, product;
+  /// Product is preferred if its inefficiency relative to that of path is below this limit.
+  double limit = 1;
+
+  double ratio() const { return product.inefficiency() / path.inefficiency(); }
+  bool prefersProduct() const { return ratio() < limit; }
+  /// Whether a comparison early in training must be made again at its end, because the results are close and product
+  /// improves with training where path is noisy.
+  bool isUndecided() const { return limit > kClearlyBetter && ratio() >= kClearlyBetter && ratio() < 1.1; }
+
+  /// Below this ratio product has the lower error in any case. Pictures have more samples than the comparison, and path
+  /// gains more from their stratification: without this margin, product was chosen in scenes in which path had the
+  /// lower error.
+  static constexpr double kClearlyBetter = 0.8;
+};
+
+/// brief: there is so little time for the picture that training further and comparing again may cost more than the
+/// better choice gains.
+PilotComparison compared(const PilotResult& path, const PilotResult& product, bool brief);
+
 /// The results in the order of the integrators.
 std::vector<PilotResult> comparePilots(const RayCamera& camera, std::span<const Integrator* const> integrators,
                                        const PilotOptions& options);

@@ -66,7 +66,8 @@ class SampleCountModel {
   SampleCounts counts(std::uint32_t record, float ratio) const;
 
  private:
-  // Counts for a ratio of 1, if they are to be above or below one.
+  // The count for a ratio of 1: splitting, from the variance, if the result is above one; otherwise roulette, from the
+  // second moment.
   struct Factor {
     float splitting = 1, roulette = 1;
     float count(float ratio) const;

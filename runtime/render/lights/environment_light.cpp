@@ -34,9 +34,9 @@ EnvironmentLight::EnvironmentLight(const Environment& environment, float subtrac
     rows_.emplace_back(weights);
     rowWeights.push_back(static_cast<float>(rows_.back().total()));
   }
-  columns_ = DiscreteDistribution(rowWeights);
+  rowChoice_ = DiscreteDistribution(rowWeights);
   const double pixelArea = 2.0 * kPi * kPi / static_cast<double>(texels_.size());
-  flux_ = constant() ? 4.0 * kPi * luminance(texels_[0].head<3>()) : columns_.total() * pixelArea;
+  flux_ = constant() ? 4.0 * kPi * luminance(texels_[0].head<3>()) : rowChoice_.total() * pixelArea;
 }
 
 EnvironmentLight EnvironmentLight::forNextEventEstimation(const Environment& environment) {
@@ -111,14 +111,14 @@ Rgb EnvironmentLight::radiance(const Vec3& direction) const {
 }
 
 double EnvironmentLight::blockWeight(const PixelBlock& block) const {
-  if (block.x0 == 0 && block.x1 == width_) return columns_.mass(block.y0, block.y1);
+  if (block.x0 == 0 && block.x1 == width_) return rowChoice_.mass(block.y0, block.y1);
   double sum = 0;
   for (int y = block.y0; y < block.y1; ++y) sum += rows_[y].mass(block.x0, block.x1);
   return sum;
 }
 
 int EnvironmentLight::sampleRow(const PixelBlock& block, float& u) const {
-  if (block.x0 == 0 && block.x1 == width_) return static_cast<int>(columns_.sample(u, block.y0, block.y1));
+  if (block.x0 == 0 && block.x1 == width_) return static_cast<int>(rowChoice_.sample(u, block.y0, block.y1));
   std::vector<float> masses;
   for (int y = block.y0; y < block.y1; ++y) masses.push_back(static_cast<float>(rows_[y].mass(block.x0, block.x1)));
   return block.y0 + static_cast<int>(DiscreteDistribution(masses).sample(u));
@@ -205,7 +205,7 @@ void EnvironmentLight::divide(int most) {
 }
 
 double EnvironmentLight::tileFraction(int tile) const {
-  return tiles_.empty() ? 1.0 : tiles_[tile].rows.total() / columns_.total();
+  return tiles_.empty() ? 1.0 : tiles_[tile].rows.total() / rowChoice_.total();
 }
 
 std::optional<EnvironmentSample> EnvironmentLight::sample(int tile, const Vec2& u,

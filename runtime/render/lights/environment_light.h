@@ -35,8 +35,8 @@ struct PixelBlock {
 
 class EnvironmentLight {
  public:
-  /// Negative and non-finite values are treated as black. `subtract` is subtracted from the luminance of every pixel
-  /// where directions are sampled, not from the radiance.
+  /// Negative and non-finite values are treated as black. Directions are sampled in proportion to
+  /// max(0, luminance − subtract); the radiance stays as it is.
   explicit EnvironmentLight(const Environment& environment, float subtract = 0);
 
   /// The environment with a density for next-event estimation (MIS compensation, Karlík et al. 2019): directions below
@@ -110,7 +110,7 @@ class EnvironmentLight {
   std::vector<Texel> texels_;
   Eigen::Matrix3f toWorld_;
   std::vector<DiscreteDistribution> rows_;
-  DiscreteDistribution columns_;  // over rows: the weights of rows_
+  DiscreteDistribution rowChoice_;  // chooses a row by the sum of its weights
   double flux_ = 0;
   std::vector<Tile> tiles_;
   std::vector<std::uint16_t> tileOf_;  // by pixel

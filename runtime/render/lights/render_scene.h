@@ -85,8 +85,9 @@ struct LightPassage {
   void scatter() { specular = false; }
   /// It continues by a delta component, in a direction that is local in hit.frame.
   void pass(const SurfaceHit& hit, const Vec3& wi, int shadowSurfaces);
-  /// Whether next-event estimation at the next surface finds the way of light that comes from infinity or not.
-  bool found(bool far) const { return specular && followed && (far || !bent); }
+  /// Whether next-event estimation at the next surface finds this way. Along a direction that refraction has changed it
+  /// finds the environment only, no light at a finite distance and no directional light.
+  bool found(bool fromEnvironment) const { return specular && followed && (fromEnvironment || !bent); }
 };
 
 /// The multiple importance weight of the emission that a path finds, against next-event estimation at the last vertex

@@ -94,7 +94,8 @@ std::vector<Chunk> trace(const RenderScene& scene, const RayCamera& camera, cons
       const Vec2 pixel = rng.uniform2();
       const Vec2 film(pixel.x() * static_cast<float>(camera.width()), pixel.y() * static_cast<float>(camera.height()));
       const Ray ray = camera.sample(static_cast<int>(film.x()), static_cast<int>(film.y()), rng);
-      chunk.samples.push_back({blocks.at(film), luminance(loop.radiance(ray, rng, chunk.camera))});
+      const float radiance = luminance(loop.radiance(ray, rng, chunk.camera));
+      if (std::isfinite(radiance)) chunk.samples.push_back({blocks.at(film), radiance});
       light.traceLight(tracing, lightRng, chunk.light, chunk.splats);
     }
   });
@@ -116,14 +117,14 @@ double trimmedVariance(const std::vector<Chunk>& chunks, const BlockValues& valu
 void addMoments(LightPathTrial& trial, const Splat& splat, double pixels, double scale) {
   // Of a single light path, without weights.
   const double whole = luminance(splat.value) * pixels * (1.0 + splat.others);
-  if (!(whole > 0) || !(scale > 0)) return;
+  if (!(whole > 0) || !std::isfinite(whole) || !(scale > 0)) return;
   const double count = trial.pathsPerPixel * pixels;
   // Light that camera paths cannot find at all would have an infinite second moment.
   const double others = std::max(splat.others / squared(trial.pathsPerPixel), kLeastOthers);
   const double weight = 1 / (1 + others);
   const double moment = squared(whole) / (count * std::sqrt(others)) / scale;
   trial.secondMoment += moment;
-  trial.left += moment * squared(others * weight) + squared(whole * weight) / count / scale;
+  trial.secondMomentLeft += moment * squared(others * weight) + squared(whole * weight) / count / scale;
 }
 
 }  // namespace
@@ -133,7 +134,7 @@ double LightPathTrial::inefficiency() const {
 }
 
 double LightPathTrial::inefficiencyWithLight() const {
-  return (std::max(variance, secondMoment) - secondMoment + left) * costWithLight;
+  return (std::max(variance, secondMoment) - secondMoment + secondMomentLeft) * costWithLight;
 }
 
 EnvironmentGuide learnEnvironmentGuide(const RenderScene& scene, const RayCamera& camera, const GuidedSampler& guide,
@@ -169,9 +170,9 @@ LightPathTrial tryLightPaths(const RenderScene& scene, const RayCamera& camera, 
       for (const Splat& splat : chunk.splats)
         addMoments(trial, splat, pixels, values.squares[blocks.at(splat.film)] * pixels * paths);
   }
-  const double best =
-      std::ranges::min_element(trials, {}, &LightPathTrial::inefficiencyWithLight)->inefficiencyWithLight();
-  return *std::ranges::find_if(trials, [&](const auto& t) { return t.inefficiencyWithLight() <= kTolerance * best; });
+  const auto best = std::ranges::min_element(trials, {}, &LightPathTrial::inefficiencyWithLight);
+  const double most = kTolerance * best->inefficiencyWithLight();
+  return *std::find_if(trials.begin(), best, [&](const auto& t) { return t.inefficiencyWithLight() <= most; });
 }
 
 }  // namespace lobe

@@ -17,12 +17,12 @@ namespace lobe {
 /// Means over the pixels of a picture, for one sample of a pixel: variances relative to the squared value of the pixel
 /// (bounded from below by that of dark pixels), costs as from PathStatistics::cost.
 struct LightPathTrial {
-  double variance = 0;       ///< of camera paths alone, as far as a trial of them shows it, without the worst 0.5 %
-  double cost = 0;           ///< of camera paths alone
-  double pathsPerPixel = 0;  ///< light paths
-  double secondMoment = 0;   ///< of camera paths alone, for the light that light paths find
-  double left = 0;           ///< the same, weighted against light paths, and of the light paths
-  double costWithLight = 0;  ///< of camera and light paths
+  double variance = 0;          ///< of camera paths alone, as far as a trial of them shows it, without the worst 0.5 %
+  double cost = 0;              ///< of camera paths alone
+  double pathsPerPixel = 0;     ///< light paths
+  double secondMoment = 0;      ///< of camera paths alone, for the light that light paths find
+  double secondMomentLeft = 0;  ///< what light paths leave of it: of the weighted camera paths, and their own
+  double costWithLight = 0;     ///< of camera and light paths
 
   /// The variance of camera paths alone includes the outliers that the trial of them may have missed.
   double inefficiency() const;

@@ -73,10 +73,11 @@ float PhotonWalk::directFraction(const EmittedPhoton& photon, const LightPassage
                                  const SurfaceHit& hit) const {
   if (!passage.specular) return 1;
   if (photon.delta) return 0;
-  if (!passage.found(photon.far)) return 1;
+  const bool fromEnvironment = photon.light < 0;
+  if (!passage.found(fromEnvironment)) return 1;
   const LightSelection nextEvent = scene_.lights.at(hit);
   float emitter = 0;
-  if (photon.far) {
+  if (fromEnvironment) {
     emitter = nextEvent.environmentPdf(hit.woWorld);
   } else {
     const float distance = passage.distance + hit.distance;
