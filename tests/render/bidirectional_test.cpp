@@ -141,7 +141,8 @@ TEST_CASE("bidirectional: every kind of surface gives the image of path tracing"
       "<shape type=\"sphere\"><point name=\"center\" x=\"0.8\" y=\"-0.3\" z=\"1\"/>"
       "<float name=\"radius\" value=\"0.9\"/>" +
       surface + "</shape>";
-  CHECK(agreesWithPath(Stage(sceneWith(kFloor + ball + kLamp))));
+  // The caustic of the mirror has heavy tails, so that the mean of few batches is not normally distributed.
+  CHECK(agreesWithPath(Stage(sceneWith(kFloor + ball + kLamp)), name == "mirror" ? 192 : 48));
 }
 
 TEST_CASE("bidirectional: interpolated normals give the image of path tracing") {
