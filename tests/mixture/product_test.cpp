@@ -1,6 +1,9 @@
 // The product of two mixtures. Formulas misprinted in Herholz et al. 2016 must fail the checks that ours pass.
 #include "tests/support/mixture_test_tools.h"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <set>
 
 #include <catch2/catch.hpp>
@@ -149,11 +152,26 @@ TEST_CASE("mixture: the largest random numbers choose a pair with nonzero weight
   const Mixture two{makeGaussian(1, {0, 0}, 0.1f, 0.1f, 0), makeGaussian(0, {50, 50}, 0.1f, 0.1f, 0)};
   const OwnedProduct product(one, 0, two);
   CHECK(product.sample(0x1.fffffep-1f, {0x1.fffffep-1f, 0x1.fffffep-1f}).norm() < 2);
+}
 
-  // Weights whose sum depends on the order of the additions, before one of weight zero.
-  const Mixture light{makeGaussian(0x1p-24f, {0, 0}, 0.1f, 0.1f, 0), makeGaussian(0x1p-24f, {0, 0}, 0.1f, 0.1f, 0),
-                      makeGaussian(1, {0, 0}, 0.1f, 0.1f, 0), makeGaussian(0, {50, 50}, 0.1f, 0.1f, 0)};
-  const OwnedProduct uneven({}, 1, light);
-  for (const float choice : {0x1.fffffep-1f, 0x1.fffffcp-1f, 0x1.fffffap-1f})
-    CHECK(uneven.sample(choice, {0.5f, 0.5f}).norm() < 2);
+TEST_CASE("mixture: an empty component of the light is never chosen") {
+  // Sums of random weights depend on the order of the additions.
+  onAllTargets([] {
+    Rng rng(31);
+    const Packed nothing({});
+    for (int i = 0; i < 2000; ++i) {
+      Mixture mixture;
+      for (int k = 0; k < 8; ++k)
+        mixture.push_back(makeGaussian(k % 4 == 3 ? 0 : std::exp2(-24 * rng.uniform()), {0, 0}, 0.1f, 0.1f, 0));
+      const Packed light = packedLight(mixture);
+      std::array<float, 8> pairs, columns;
+      pairMasses(nothing.view(), 1, light.view(), pairs.data(), columns.data());
+      CHECK(std::ranges::is_sorted(columns));
+      for (const float choice : {0.0f, rng.uniform(), 0x1.fffffep-1f}) {
+        const PairIndex chosen = choosePair(pairs.data(), columns.data(), 1, 8, choice);
+        CHECK(chosen.row == 0);
+        CHECK(pairs[static_cast<std::size_t>(chosen.column)] > 0);
+      }
+    }
+  });
 }
