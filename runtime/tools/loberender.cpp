@@ -59,6 +59,8 @@ const Names<LightPathUse> kLightPathNames{
     {"auto", LightPathUse::automatic}, {"on", LightPathUse::on}, {"off", LightPathUse::off}};
 const Names<RussianRoulette> kRussianRouletteNames{{"throughput", RussianRoulette::throughput},
                                                    {"efficiency", RussianRoulette::efficiency}};
+const Names<PixelFiltering> kFilteringNames{{"splatting", PixelFiltering::splatting},
+                                            {"importance", PixelFiltering::importance}};
 const Names<PixelSampling> kSamplerNames{{"sobol", PixelSampling::sobol}, {"independent", PixelSampling::independent}};
 const Names<ReconstructionNorm> kNormNames{{"l2", ReconstructionNorm::l2}, {"l1", ReconstructionNorm::l1}};
 const Names<bool> kFractionsNames{{"fixed", false}, {"learnt", true}};
@@ -205,6 +207,11 @@ void declare(CLI::App& app, Options& options) {
   app.add_option("--sampler", job.sampling, "Random numbers of a pixel: Owen-scrambled Sobol' points, or independent")
       ->transform(oneOf(kSamplerNames))
       ->default_str("sobol");
+  app.add_option("--filtering", job.filtering,
+                 "How samples contribute to pixels: splatting (to all whose filter covers them: less noise) or "
+                 "importance (to one pixel, sampled from its filter: independent noise, for denoisers)")
+      ->transform(oneOf(kFilteringNames))
+      ->default_str("splatting");
   app.add_option("--seed", job.seed, "Random seed")
       ->check(CLI::Range(std::uint64_t{0}, kMaxSeed))
       ->capture_default_str();

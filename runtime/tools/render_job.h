@@ -58,6 +58,7 @@ struct RenderJob {
   std::optional<int> maxDepth;  ///< in segments; empty: max_depth of the scene, or no limit
   int shadowSurfaces = RenderScene::kDefaultShadowSurfaces;
   PixelSampling sampling = PixelSampling::sobol;
+  PixelFiltering filtering = PixelFiltering::splatting;
   RussianRoulette russianRoulette = RussianRoulette::efficiency;
   std::optional<float> fireflyLimit;  ///< PathOptions::fireflyLimit
   std::uint64_t seed = 1;

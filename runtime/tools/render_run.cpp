@@ -245,7 +245,7 @@ void Run::saveTraining() {
 }
 
 RenderOptions Run::options() {
-  RenderOptions options{job_.seed, job_.samples, std::nullopt, job_.sampling, job_.sampleOffset};
+  RenderOptions options{job_.seed, job_.samples, std::nullopt, job_.sampling, job_.filtering, job_.sampleOffset};
   if (job_.seconds) options.seconds = std::max(*job_.seconds - prepared(), 1e-3);
   if (const double every = job_.snapshotEvery.value_or(RenderJob::kSnapshotSeconds); every > 0)
     options.longestWave = every;

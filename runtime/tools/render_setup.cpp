@@ -223,6 +223,7 @@ RunSettings settingsOf(const RenderJob& job, const Scene& scene, const Guiding& 
                   {"the size", fmt::format("{}x{}", picture.width, picture.height)},
                   {"--seed", std::to_string(job.seed)},
                   {"--sampler", job.sampling == PixelSampling::sobol ? "sobol" : "independent"},
+                  {"--filtering", job.filtering == PixelFiltering::splatting ? "splatting" : "importance"},
                   {"--sample-offset", std::to_string(job.sampleOffset)},
                   {"--max-depth", job.maxDepth ? std::to_string(*job.maxDepth) : "that of the scene"},
                   {"--shadow-surfaces", std::to_string(job.shadowSurfaces)},

@@ -143,7 +143,16 @@ Ray RayCamera::rayThrough(const Vec2& point, const Vec2& lens) const {
 
 CameraSample RayCamera::sample(Sampler& rng) const {
   const Vec2 offset = filter_.sample(rng.stratified2());
-  return {offset, hasLens() ? squareToDisk(rng.stratified2()) : Vec2(Vec2::Zero())};
+  return {offset, sampleLens(rng)};
+}
+
+CameraSample RayCamera::sample(const Vec2& offset, Sampler& rng) const {
+  rng.skip(2);
+  return {offset, sampleLens(rng)};
+}
+
+Vec2 RayCamera::sampleLens(Sampler& rng) const {
+  return hasLens() ? squareToDisk(rng.stratified2()) : Vec2(Vec2::Zero());
 }
 
 float RayCamera::density(const Ray& ray, float distance) const {

@@ -1,8 +1,8 @@
 #pragma once
-// Camera rays, and the projection of points to the image. Each camera ray contributes to one pixel: the reconstruction
-// filter is importance sampled (Ernst et al. 2006, "Filter Importance Sampling"), so that pixels are means of
-// independent samples and need no splatting. Negative lobes of filters are omitted, so that pixels are never negative:
-// mitchell, catmullrom and lanczos give slightly softer images than with splatting.
+// Camera rays, and the projection of points to the image. A ray passes the film at a point that is sampled from the
+// reconstruction filter of one pixel (Ernst et al. 2006, "Filter Importance Sampling"), or at a given point. Negative
+// lobes of filters are omitted, so that pixels are never negative: mitchell, catmullrom and lanczos give slightly
+// softer images than with them.
 
 #include <optional>
 
@@ -22,12 +22,13 @@ class FilterSampler {
   Vec2 sample(const Vec2& u) const { return {sample(u.x()), sample(u.y())}; }
   /// The density of sample, in pixels⁻².
   float density(const Vec2& offset) const { return density(offset.x()) * density(offset.y()); }
+  /// The density of one coordinate of sample, in pixels⁻¹; both have the same.
+  float density(float offset) const;
   /// The largest distance from the pixel's centre along each axis.
   float radius() const { return filter_.radius; }
 
  private:
   float sample(float u) const;
-  float density(float offset) const;
   PixelFilter filter_;
   DiscreteDistribution intervals_;  // over equal intervals of [−radius, radius], for filters without closed form
 };
@@ -64,6 +65,8 @@ class RayCamera {
   Ray sample(int x, int y, Sampler& rng) const { return rayThrough(x, y, sample(rng)); }
   /// The random numbers of `sample`, and the ray for a pixel with such numbers.
   CameraSample sample(Sampler& rng) const;
+  /// The same with a given offset, in place of which the stratified numbers are left out.
+  CameraSample sample(const Vec2& offset, Sampler& rng) const;
   Ray rayThrough(int x, int y, const CameraSample& sample) const {
     return rayThrough(Vec2(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f) + sample.offset, sample.lens);
   }
@@ -84,6 +87,7 @@ class RayCamera {
   const FilterSampler& filter() const { return filter_; }
 
  private:
+  Vec2 sampleLens(Sampler& rng) const;
   Ray clipped(const Vec3& origin, const Vec3& direction) const;
   bool orthographic() const { return kind_ == Camera::Kind::orthographic; }
 

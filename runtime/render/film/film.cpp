@@ -4,19 +4,16 @@
 #include <cmath>
 
 namespace lobe {
-namespace {
 
-bool usable(const Rgb& c) {
-  for (const float value : c)
+bool isUsableSample(const Rgb& sample) {
+  for (const float value : sample)
     if (!(value >= 0.0f) || !std::isfinite(value)) return false;
   return true;
 }
 
-}  // namespace
-
 void Film::add(int x, int y, const Rgb& sample) {
   Pixel& pixel = pixels_[static_cast<std::size_t>(y) * width_ + x];
-  if (!usable(sample)) {
+  if (!isUsableSample(sample)) {
     ++pixel.dropped;
     return;
   }

@@ -10,6 +10,9 @@
 
 namespace lobe {
 
+/// Whether all components are finite and not negative.
+bool isUsableSample(const Rgb& sample);
+
 class Film {
  public:
   /// The sums over the samples of a pixel.

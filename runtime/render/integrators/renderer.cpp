@@ -9,12 +9,16 @@
 
 #include "runtime/core/parallel.h"
 #include "runtime/core/stopwatch.h"
+#include "runtime/render/film/sample_grid.h"
 
 namespace lobe {
 namespace {
 
 constexpr int kTileSize = 16;
-constexpr std::uint64_t kLightSeed = 0x6c69676874;  // keeps the random numbers of light paths apart
+constexpr std::uint64_t kLightSeed = 0x6c69676874;        // keeps the random numbers of light paths apart
+constexpr std::uint64_t kGridStream = ~std::uint64_t{0};  // of the offsets of sample grids; no pixel has this index
+constexpr int kMostGrids = 16;                            // that are rendered at a time
+constexpr std::size_t kMostGridPoints = std::size_t{1} << 24;  // of all of these, to bound their memory
 
 /// A part of the samples of all pixels.
 struct Wave {
@@ -22,12 +26,28 @@ struct Wave {
   bool complete = true;
 };
 
-/// The pixels of an image in tiles, with the random numbers of their samples.
+/// The width of the border around the image in which samples are made; 0: every sample contributes to its pixel alone.
+int borderOf(const RayCamera& camera, const RenderOptions& options) {
+  return options.filtering == PixelFiltering::splatting ? SampleGrid::border(camera.filter()) : 0;
+}
+
+/// Whether a pixel does not belong to the border.
+bool isInImage(const RayCamera& camera, int x, int y) {
+  return x >= 0 && y >= 0 && x < camera.width() && y < camera.height();
+}
+
+/// The offset of the points of sample s, counted from RenderOptions::firstSample, from the centres of their pixels.
+Vec2 gridOffset(const RenderOptions& options, int s) {
+  return options.sampler(kGridStream, s).stratified2() - Vec2::Constant(0.5f);
+}
+
+/// The pixels of an image and of a border around it in tiles, with the random numbers of their samples.
 class Tiles {
  public:
-  Tiles(const RayCamera& camera, const RenderOptions& options) : camera_(camera), options_(options) {
-    columns_ = (camera.width() + kTileSize - 1) / kTileSize;
-    count_ = columns_ * ((camera.height() + kTileSize - 1) / kTileSize);
+  Tiles(const RayCamera& camera, const RenderOptions& options, int border)
+      : camera_(camera), options_(options), border_(border) {
+    tileColumns_ = (columns() + kTileSize - 1) / kTileSize;
+    count_ = tileColumns_ * ((rows() + kTileSize - 1) / kTileSize);
   }
 
   int count() const { return count_; }
@@ -55,21 +75,34 @@ class Tiles {
   Sampler lightSampler(int x, int y, int s) const {
     return Sampler(options_.seed ^ kLightSeed, pixelOf(x, y), options_.indexOf(s));
   }
-  int indexOf(int s) const { return static_cast<int>(options_.indexOf(s)); }
-  std::uint64_t pixelOf(int x, int y) const { return static_cast<std::uint64_t>(y) * camera_.width() + x; }
+  std::uint64_t pixelOf(int x, int y) const {
+    return static_cast<std::uint64_t>(y + border_) * columns() + static_cast<std::uint64_t>(x + border_);
+  }
 
  private:
   template <class RenderPixel>
   void renderTile(int tile, PathStatistics& statistics, const RenderPixel& renderPixel) const {
-    const int x0 = tile % columns_ * kTileSize;
-    const int y0 = tile / columns_ * kTileSize;
-    for (int y = y0; y < std::min(y0 + kTileSize, camera_.height()); ++y)
-      for (int x = x0; x < std::min(x0 + kTileSize, camera_.width()); ++x) renderPixel(x, y, tile, statistics);
+    const int x0 = tile % tileColumns_ * kTileSize - border_;
+    const int y0 = tile / tileColumns_ * kTileSize - border_;
+    for (int y = y0; y < std::min(y0 + kTileSize, camera_.height() + border_); ++y)
+      for (int x = x0; x < std::min(x0 + kTileSize, camera_.width() + border_); ++x)
+        if (isInImage(camera_, x, y)) {
+          renderPixel(x, y, tile, statistics);
+        } else {
+          // The light cut off in the border is not missing in the image.
+          PathStatistics ofBorder;
+          renderPixel(x, y, tile, ofBorder);
+          ofBorder.cut = {};
+          statistics += ofBorder;
+        }
   }
+
+  int columns() const { return camera_.width() + 2 * border_; }
+  int rows() const { return camera_.height() + 2 * border_; }
 
   const RayCamera& camera_;
   const RenderOptions& options_;
-  int columns_, count_;
+  int border_, tileColumns_, count_;
 };
 
 bool isSet(const StopFlag* stop) {
@@ -79,7 +112,7 @@ bool isSet(const StopFlag* stop) {
 class WaveRenderer {
  public:
   WaveRenderer(const RayCamera& camera, const AddSample& addSample, const Film& film, const RenderOptions& options)
-      : addSample_(addSample), film_(film), stop_(options.stop), tiles_(camera, options) {}
+      : addSample_(addSample), film_(film), stop_(options.stop), tiles_(camera, options, 0) {}
 
   /// Adds to every pixel the samples that it lacks to have `samples` of them.
   Wave render(int samples) {
@@ -102,20 +135,83 @@ class WaveRenderer {
   Tiles tiles_;
 };
 
+/// Renders a few samples of all pixels at a time, on grids. Pixel by pixel, because the samples of a pixel use the same
+/// data.
+class GridRenderer {
+ public:
+  GridRenderer(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options)
+      : camera_(camera),
+        integrator_(integrator),
+        film_(film),
+        options_(options),
+        tiles_(camera, options, borderOf(camera, options)) {}
+
+  /// Adds samples until every pixel has `samples` of them. When it is stopped, samples that not all pixels have are
+  /// discarded, but for the first one, which is completed.
+  Wave render(int samples) {
+    Wave wave;
+    int done = static_cast<int>(film_.sampleRange().first);
+    while (done < samples) {
+      const int count = std::min(samples - done, mostGrids());
+      const Wave part = renderGrids(done, count);
+      wave.complete = part.complete;
+      if (!wave.complete) break;
+      wave.statistics += part.statistics;
+      for (int i = 0; i < count; ++i) addToFilm(grids_[i], done + i);
+      done += count;
+    }
+    return wave;
+  }
+
+ private:
+  int mostGrids() const {
+    return static_cast<int>(std::clamp<std::size_t>(kMostGridPoints / film_.pixels().size(), 1, kMostGrids));
+  }
+
+  Wave renderGrids(int first, int count) {
+    while (static_cast<int>(grids_.size()) < count)
+      grids_.emplace_back(camera_.width(), camera_.height(), camera_.filter());
+    std::vector<Vec2> offsets;
+    for (int i = 0; i < count; ++i) offsets.push_back(gridOffset(options_, first + i));
+    return tiles_.render([&] { return first > 0 && isSet(options_.stop); },
+                         [&](int x, int y, int, PathStatistics& statistics) {
+                           for (int i = 0; i < count; ++i) {
+                             Sampler rng = tiles_.sampler(x, y, first + i);
+                             const Ray ray = camera_.rayThrough(x, y, camera_.sample(offsets[i], rng));
+                             grids_[i].at(x, y) = integrator_.radiance(ray, rng, statistics);
+                           }
+                         });
+  }
+
+  void addToFilm(SampleGrid& grid, int s) {
+    grid.convolve(gridOffset(options_, s));
+    parallelFor(0, camera_.height(), [&](int y) {
+      for (int x = 0; x < camera_.width(); ++x) film_.add(x, y, grid.filtered(x, y));
+    });
+  }
+
+  const RayCamera& camera_;
+  const Integrator& integrator_;
+  Film& film_;
+  const RenderOptions& options_;
+  Tiles tiles_;
+  std::vector<SampleGrid> grids_;
+};
+
 /// Renders sample by sample, each of all pixels.
 class ImageRenderer {
  public:
   ImageRenderer(const RayCamera& camera, const AddImageSample& addSample, const Film& film,
-                const RenderOptions& options)
-      : addSample_(addSample), film_(film), stop_(options.stop), tiles_(camera, options) {}
+                const RenderOptions& options, int border)
+      : addSample_(addSample), film_(film), options_(options), tiles_(camera, options, border) {}
 
   /// Adds samples until every pixel has `samples` of them.
   Wave render(int samples) {
     Wave wave;
     for (int s = static_cast<int>(film_.sampleRange().first); s < samples; ++s) {
-      wave.complete = !isSet(stop_);
+      wave.complete = !isSet(options_.stop);
       if (!wave.complete) break;
-      wave.statistics += addSample_(OneSample(tiles_, s));
+      wave.statistics += addSample_(OneSample(tiles_, options_, s));
     }
     return wave;
   }
@@ -123,8 +219,10 @@ class ImageRenderer {
  private:
   class OneSample : public ImageSample {
    public:
-    OneSample(const Tiles& tiles, int sample) : tiles_(tiles), sample_(sample) {}
-    int index() const override { return static_cast<int>(tiles_.indexOf(sample_)); }
+    OneSample(const Tiles& tiles, const RenderOptions& options, int sample)
+        : tiles_(tiles), options_(options), sample_(sample) {}
+    int index() const override { return static_cast<int>(options_.indexOf(sample_)); }
+    Vec2 offset() const override { return gridOffset(options_, sample_); }
     int tiles() const override { return tiles_.count(); }
     PathStatistics forEachPixel(const VisitPixel& visit) const override {
       return tiles_
@@ -138,23 +236,25 @@ class ImageRenderer {
 
    private:
     const Tiles& tiles_;
+    const RenderOptions& options_;
     int sample_;
   };
 
   const AddImageSample& addSample_;
   const Film& film_;
-  const StopFlag* stop_;
+  const RenderOptions& options_;
   Tiles tiles_;
 };
 
 /// Adds samples of a bidirectional integrator to a film.
 class BidirectionalSamples {
  public:
-  BidirectionalSamples(const RayCamera& camera, BidirectionalIntegrator& integrator, Film& film)
+  BidirectionalSamples(const RayCamera& camera, BidirectionalIntegrator& integrator, Film& film, int border)
       : camera_(camera),
         integrator_(integrator),
         film_(film),
-        fromCamera_(camera.width(), camera.height()),
+        border_(border),
+        fromCamera_(camera.width(), camera.height(), camera.filter()),
         fromLights_(camera) {}
 
   PathStatistics add(const ImageSample& sample) {
@@ -163,12 +263,19 @@ class BidirectionalSamples {
     PathStatistics statistics = storeLightPaths(sample);
     statistics +=
         sample.forEachPixel([&](int x, int y, int tile, Sampler& rng, Sampler& lightRng, PathStatistics& counts) {
-          const Ray ray = camera_.sample(x, y, rng);
-          fromCamera_.at(x, y) = integrator_.radiance(ray, rng, lightRng, counts, splats_[tile]);
+          const CameraSample place = border_ > 0 ? camera_.sample(sample.offset(), rng) : camera_.sample(rng);
+          // The light image is of one light path per pixel; that of the border serves its camera path alone.
+          std::vector<Splat> unused;
+          fromCamera_.at(x, y) = integrator_.radiance(camera_.rayThrough(x, y, place), rng, lightRng, counts,
+                                                      isInImage(camera_, x, y) ? splats_[tile] : unused);
         });
     fromLights_.sum(splats_);
+    if (border_ > 0) fromCamera_.convolve(sample.offset());
     for (int y = 0; y < camera_.height(); ++y)
-      for (int x = 0; x < camera_.width(); ++x) film_.add(x, y, fromCamera_.at(x, y) + fromLights_.at(x, y));
+      for (int x = 0; x < camera_.width(); ++x) {
+        const Rgb& fromCamera = border_ > 0 ? fromCamera_.filtered(x, y) : fromCamera_.at(x, y);
+        film_.add(x, y, fromCamera + fromLights_.at(x, y));
+      }
     return statistics;
   }
 
@@ -178,8 +285,8 @@ class BidirectionalSamples {
     integrator_.beginSample(sample.index());
     std::vector<std::vector<Photon>> perTile(sample.tiles());
     const PathStatistics statistics =
-        sample.forEachPixel([&](int, int, int tile, Sampler&, Sampler& lightRng, PathStatistics& counts) {
-          integrator_.storeLightPath(lightRng, counts, perTile[tile]);
+        sample.forEachPixel([&](int x, int y, int tile, Sampler&, Sampler& lightRng, PathStatistics& counts) {
+          if (isInImage(camera_, x, y)) integrator_.storeLightPath(lightRng, counts, perTile[tile]);
         });
     std::vector<Photon> all;
     for (const std::vector<Photon>& photons : perTile) all.insert(all.end(), photons.begin(), photons.end());
@@ -190,7 +297,8 @@ class BidirectionalSamples {
   const RayCamera& camera_;
   BidirectionalIntegrator& integrator_;
   Film& film_;
-  Image fromCamera_;
+  int border_;
+  SampleGrid fromCamera_;
   LightImage fromLights_;
   std::vector<std::vector<Splat>> splats_;  // by tile
 };
@@ -267,6 +375,10 @@ RenderResult renderWaves(Renderer renderer, const Film& film, const RenderOption
 
 RenderResult render(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options,
                     const AfterWave& afterWave, const RenderResult& before) {
+  if (borderOf(camera, options) > 0) {
+    options.validate();
+    return renderWaves(GridRenderer(camera, integrator, film, options), film, options, afterWave, before);
+  }
   const AddSample addSample = [&](int x, int y, Sampler& rng, PathStatistics& statistics) {
     const Ray ray = camera.sample(x, y, rng);
     film.add(x, y, integrator.radiance(ray, rng, statistics));
@@ -283,14 +395,16 @@ RenderResult render(const RayCamera& camera, const AddSample& addSample, const F
 RenderResult render(const RayCamera& camera, const AddImageSample& addSample, const Film& film,
                     const RenderOptions& options, const AfterWave& afterWave, const RenderResult& before) {
   options.validate();
-  return renderWaves(ImageRenderer(camera, addSample, film, options), film, options, afterWave, before);
+  return renderWaves(ImageRenderer(camera, addSample, film, options, 0), film, options, afterWave, before);
 }
 
 RenderResult render(const RayCamera& camera, BidirectionalIntegrator& integrator, Film& film,
                     const RenderOptions& options, const AfterWave& afterWave, const RenderResult& before) {
-  BidirectionalSamples samples(camera, integrator, film);
+  options.validate();
+  const int border = borderOf(camera, options);
+  BidirectionalSamples samples(camera, integrator, film, border);
   const AddImageSample addSample = [&](const ImageSample& sample) { return samples.add(sample); };
-  return render(camera, addSample, film, options, afterWave, before);
+  return renderWaves(ImageRenderer(camera, addSample, film, options, border), film, options, afterWave, before);
 }
 
 }  // namespace lobe

@@ -16,12 +16,20 @@ namespace lobe {
 /// first vertices (Sampler::stratified), or independent numbers.
 enum class PixelSampling { sobol, independent };
 
+/// How samples are weighted by the reconstruction filter. Both converge to the same image.
+enum class PixelFiltering {
+  splatting,  ///< a sample contributes to all pixels whose filter covers it (SampleGrid): less noise
+  importance  ///< it contributes to one pixel, for which it is sampled from the filter: the noise of pixels is
+              ///< independent
+};
+
 /// Exactly one of samples and seconds is set.
 struct RenderOptions {
   std::uint64_t seed = 1;
   std::optional<int> samples;     ///< per pixel: the same image for a seed, on any number of threads
   std::optional<double> seconds;  ///< stops when another wave would not fit; renders at least one sample per pixel
   PixelSampling sampling = PixelSampling::sobol;
+  PixelFiltering filtering = PixelFiltering::splatting;
   int firstSample = 0;             ///< index of the first sample of every pixel; firstSample + samples must fit an int
   double longestWave = kInfinity;  ///< approximate limit in seconds of the time between calls of AfterWave
   const StopFlag* stop = nullptr;  ///< ends rendering after the current tiles when it is set
@@ -51,18 +59,21 @@ struct RenderResult {
 /// Adds one sample to the pixel (x, y) of a film. Called concurrently for different pixels.
 using AddSample = std::function<void(int x, int y, Sampler& rng, PathStatistics& statistics)>;
 
-/// One sample of every pixel, of an image whose samples are made together.
+/// One sample of every pixel, of an image whose samples are made together. With PixelFiltering::splatting, also one of
+/// every pixel of a border around the image, with coordinates below 0 or from the size on.
 class ImageSample {
  public:
   virtual ~ImageSample() = default;
   /// Its index, RenderOptions::firstSample included.
   virtual int index() const = 0;
+  /// With PixelFiltering::splatting, the offset of its points from the centres of their pixels.
+  virtual Vec2 offset() const = 0;
   /// The number of tiles; the pixels of each are visited by one thread, in the same order on any number of threads.
   virtual int tiles() const = 0;
   /// Random numbers for the pixel's camera path, and independent ones for a light path.
   using VisitPixel =
       std::function<void(int x, int y, int tile, Sampler& rng, Sampler& lightRng, PathStatistics& statistics)>;
-  /// Calls `visit` for all pixels, in parallel by tiles.
+  /// Calls `visit` for all pixels and for those of the border, in parallel by tiles.
   virtual PathStatistics forEachPixel(const VisitPixel& visit) const = 0;
 };
 
@@ -75,16 +86,18 @@ using AfterWave = std::function<void(const RenderResult&)>;
 /// Adds samples to the film, which must have the size of the camera's image. Sample s of pixel i, counted from
 /// firstSample, uses the random stream (seed, i, s). A film that already has samples is continued: each pixel gets the
 /// samples that it lacks, so that the result has the same bytes as that of an uninterrupted run. `before` is the result
-/// of the run that has filled the film.
+/// of the run that has filled the film. With PixelFiltering::splatting, a film that is continued must have equally many
+/// samples in all pixels, as films of such runs have: if they are stopped, up to 16 samples of each pixel are
+/// discarded.
 RenderResult render(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options,
                     const AfterWave& afterWave = {}, const RenderResult& before = {});
 /// The same for samples that are not only the radiance along a ray of their own pixel: addSample must add exactly one
-/// sample to the film.
+/// sample to the film. RenderOptions::filtering is not used.
 RenderResult render(const RayCamera& camera, const AddSample& addSample, const Film& film, const RenderOptions& options,
                     const AfterWave& afterWave = {}, const RenderResult& before = {});
-/// The same for samples that are made for all pixels together: addSample must add exactly one sample to each pixel of
-/// the film. Rendering is only stopped between samples, so that all pixels have equally many; a film that is continued
-/// must be like that.
+/// The same for samples that are made for all pixels together, without a border: addSample must add exactly one sample
+/// to each pixel of the film. Rendering is only stopped between samples, so that all pixels have equally many; a film
+/// that is continued must be like that.
 RenderResult render(const RayCamera& camera, const AddImageSample& addSample, const Film& film,
                     const RenderOptions& options, const AfterWave& afterWave = {}, const RenderResult& before = {});
 /// The same with light paths: sample s of pixel i is the radiance along its camera ray plus what the
