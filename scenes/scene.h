@@ -172,7 +172,7 @@ struct Camera {
   FilmCrop picture() const { return crop.value_or(FilmCrop{0, 0, width, height}); }
 };
 
-/// The reconstruction filter that the file requests. It is importance-sampled, so each sample contributes to one pixel.
+/// The reconstruction filter that the file requests.
 struct PixelFilter {
   enum class Kind { box, tent, gaussian, mitchell, lanczos } kind = Kind::box;
   float radius = 0.5f;                     ///< pixels

@@ -24,10 +24,10 @@ struct MeanEstimate {
 /// the two images only counts 2 at most, so rare outliers count less than against a reference.
 ///
 /// The intervals are those of the bootstrap (percentiles of kBootstrapSamples resamples, Efron and Tibshirani 1993,
-/// Chapter 13) that draws blocks of kBootstrapBlock × kBootstrapBlock pixels, because neighbouring pixels of
-/// reconstructed images are correlated. They are conservative for one scene, because the parts of a picture differ more
-/// than the noise of each, but do not contain what all pixels of a picture share, for example its training. Equal
-/// images give equal intervals.
+/// Chapter 13) that draws blocks of kBootstrapBlock × kBootstrapBlock pixels, because neighbouring pixels are
+/// correlated if a sample contributes to several of them, or if the image is reconstructed from gradients. They are
+/// conservative for one scene, because the parts of a picture differ more than the noise of each, but do not contain
+/// what all pixels of a picture share, for example its training. Equal images give equal intervals.
 struct PairVariance {
   MeanEstimate all;           ///< over all pixels
   MeanEstimate drop01;        ///< without the largest 0.1 % (rounded down)

@@ -209,7 +209,7 @@ void declare(CLI::App& app, Options& options) {
       ->default_str("sobol");
   app.add_option("--filtering", job.filtering,
                  "How samples contribute to pixels: splatting (to all whose filter covers them: less noise) or "
-                 "importance (to one pixel, sampled from its filter: independent noise, for denoisers)")
+                 "importance (to one pixel, sampled from its filter: independent noise, as denoisers expect)")
       ->transform(oneOf(kFilteringNames))
       ->default_str("splatting");
   app.add_option("--seed", job.seed, "Random seed")

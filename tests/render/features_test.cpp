@@ -158,7 +158,7 @@ TEST_CASE("features: rays between two mirrors end") {
   CHECK(f.normal.norm() == Approx(1));
 }
 
-TEST_CASE("features: a film has the means of the samples of the picture, and the smallest depth") {
+TEST_CASE("features: a film has the means over the samples of each pixel, and the smallest depth") {
   Scene scene = wall();
   // A nearer wall whose edge passes through the pixels of column 4.
   addShape(scene, rectangle({0.2f, -50, 2}, {0, 100, 0}, {100, 0, 0}),

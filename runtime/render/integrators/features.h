@@ -1,7 +1,8 @@
 #pragma once
 // What the camera sees in each pixel, for denoisers and compositing: albedo, normal and depth. They depend on the
 // scene, the camera and the random numbers of the samples alone, not on the integrator, and are computed from camera
-// rays of their own, which are those of the samples. So a resumed run, and parts of a picture, have the same features.
+// rays of their own, one for each sample, which pass the film at a point that is sampled from the filter of the pixel.
+// So a resumed run, and parts of a picture, have the same features.
 
 #include "runtime/render/integrators/renderer.h"
 #include "runtime/render/lights/render_scene.h"
@@ -27,14 +28,14 @@ inline constexpr float kNoDepth = 1e10f;
 
 Features featuresAlong(const RenderScene& scene, const RayCamera& camera, const Ray& ray, EmitterVisibility visibility);
 
-/// Accumulates features of the samples of a picture.
+/// Accumulates as many features of each pixel as a picture has samples.
 class FeatureFilm {
  public:
   FeatureFilm(int width, int height)
       : width_(width), height_(height), pixels_(static_cast<std::size_t>(width) * height) {}
 
-  /// Adds to each pixel the samples that the film, of the same size, has and it has not yet. options: those with which
-  /// the samples are rendered.
+  /// Adds to each pixel the number of samples that the film, of the same size, has more. options: those with which the
+  /// picture is rendered.
   void addMissing(const Film& film, const RenderScene& scene, const RayCamera& camera, const RenderOptions& options);
 
   /// Means over the samples of each pixel; zero without samples.

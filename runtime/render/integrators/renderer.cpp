@@ -18,17 +18,23 @@ constexpr int kTileSize = 16;
 constexpr std::uint64_t kLightSeed = 0x6c69676874;        // keeps the random numbers of light paths apart
 constexpr std::uint64_t kGridStream = ~std::uint64_t{0};  // of the offsets of sample grids; no pixel has this index
 constexpr int kMostGrids = 16;                            // that are rendered at a time
-constexpr std::size_t kMostGridPoints = std::size_t{1} << 24;  // of all of these, to bound their memory
+constexpr std::size_t kMostGridPoints = std::size_t{1} << 23;  // of all of these, to bound their memory
 
 /// A part of the samples of all pixels.
 struct Wave {
   PathStatistics statistics;
   bool complete = true;
+  std::vector<char> done = {};  ///< of each tile, whether it was rendered
 };
 
 /// The width of the border around the image in which samples are made; 0: every sample contributes to its pixel alone.
 int borderOf(const RayCamera& camera, const RenderOptions& options) {
-  return options.filtering == PixelFiltering::splatting ? SampleGrid::border(camera.filter()) : 0;
+  if (options.filtering == PixelFiltering::importance) return 0;
+  const int border = GridFilter::border(camera.filter());
+  const double width = camera.width(), height = camera.height();
+  // The border of a very small image takes more time than the lower variance is worth.
+  const double points = (width + 2 * border) * (height + 2 * border);
+  return points * GridFilter::relativeVariance(camera.filter()) < width * height ? border : 0;
 }
 
 /// Whether a pixel does not belong to the border.
@@ -37,8 +43,8 @@ bool isInImage(const RayCamera& camera, int x, int y) {
 }
 
 /// The offset of the points of sample s, counted from RenderOptions::firstSample, from the centres of their pixels.
-Vec2 gridOffset(const RenderOptions& options, int s) {
-  return options.sampler(kGridStream, s).stratified2() - Vec2::Constant(0.5f);
+Vec2 gridOffset(const RayCamera& camera, const RenderOptions& options, int s) {
+  return GridFilter::sampleOffset(camera.filter(), options.sampler(kGridStream, s).stratified2());
 }
 
 /// The pixels of an image and of a border around it in tiles, with the random numbers of their samples.
@@ -61,13 +67,25 @@ class Tiles {
       if (!skip()) renderTile(tile, perTile[tile].emplace(), renderPixel);
     });
     Wave wave;
-    for (const auto& statistics : perTile)
+    for (const auto& statistics : perTile) {
+      wave.done.push_back(statistics.has_value());
       if (statistics)
         wave.statistics += *statistics;
       else
         wave.complete = false;
+    }
     return wave;
   }
+
+  /// Whether a wave has rendered all points that contribute to a pixel of the image.
+  bool areDoneAround(int x, int y, const Wave& wave) const {
+    for (int row = y / kTileSize; row <= (y + 2 * border_) / kTileSize; ++row)
+      for (int column = x / kTileSize; column <= (x + 2 * border_) / kTileSize; ++column)
+        if (!wave.done[row * tileColumns_ + column]) return false;
+    return true;
+  }
+
+  int border() const { return border_; }
 
   /// For sample s, counted from RenderOptions::firstSample.
   Sampler sampler(int x, int y, int s) const { return options_.sampler(pixelOf(x, y), s); }
@@ -89,10 +107,11 @@ class Tiles {
         if (isInImage(camera_, x, y)) {
           renderPixel(x, y, tile, statistics);
         } else {
-          // The light cut off in the border is not missing in the image.
+          // The image does not contain the border.
           PathStatistics ofBorder;
           renderPixel(x, y, tile, ofBorder);
           ofBorder.cut = {};
+          ofBorder.largest = {};
           statistics += ofBorder;
         }
   }
@@ -144,20 +163,19 @@ class GridRenderer {
         integrator_(integrator),
         film_(film),
         options_(options),
-        tiles_(camera, options, borderOf(camera, options)) {}
+        tiles_(camera, options, borderOf(camera, options)),
+        filter_(camera.width(), camera.height(), camera.filter()) {}
 
-  /// Adds samples until every pixel has `samples` of them. When it is stopped, samples that not all pixels have are
-  /// discarded, but for the first one, which is completed.
+  /// Adds to every pixel the samples that it lacks to have `samples` of them. The statistics are those of the samples
+  /// that all pixels have in the end, because samples of which a part is missing are rendered again later.
   Wave render(int samples) {
     Wave wave;
-    int done = static_cast<int>(film_.sampleRange().first);
-    while (done < samples) {
+    for (int done = static_cast<int>(film_.sampleRange().first); done < samples && wave.complete;) {
       const int count = std::min(samples - done, mostGrids());
       const Wave part = renderGrids(done, count);
+      for (int i = 0; i < count; ++i) addToFilm(grids_[i], done + i, part);
       wave.complete = part.complete;
-      if (!wave.complete) break;
-      wave.statistics += part.statistics;
-      for (int i = 0; i < count; ++i) addToFilm(grids_[i], done + i);
+      if (part.complete) wave.statistics += part.statistics;
       done += count;
     }
     return wave;
@@ -170,10 +188,10 @@ class GridRenderer {
 
   Wave renderGrids(int first, int count) {
     while (static_cast<int>(grids_.size()) < count)
-      grids_.emplace_back(camera_.width(), camera_.height(), camera_.filter());
+      grids_.emplace_back(camera_.width(), camera_.height(), tiles_.border());
     std::vector<Vec2> offsets;
-    for (int i = 0; i < count; ++i) offsets.push_back(gridOffset(options_, first + i));
-    return tiles_.render([&] { return first > 0 && isSet(options_.stop); },
+    for (int i = 0; i < count; ++i) offsets.push_back(gridOffset(camera_, options_, first + i));
+    return tiles_.render([&] { return isSet(options_.stop); },
                          [&](int x, int y, int, PathStatistics& statistics) {
                            for (int i = 0; i < count; ++i) {
                              Sampler rng = tiles_.sampler(x, y, first + i);
@@ -183,10 +201,13 @@ class GridRenderer {
                          });
   }
 
-  void addToFilm(SampleGrid& grid, int s) {
-    grid.convolve(gridOffset(options_, s));
+  /// Adds sample s to the pixels that lack it and for which all points of the grid have been rendered.
+  void addToFilm(const SampleGrid& grid, int s, const Wave& wave) {
+    filter_.apply(grid, gridOffset(camera_, options_, s));
     parallelFor(0, camera_.height(), [&](int y) {
-      for (int x = 0; x < camera_.width(); ++x) film_.add(x, y, grid.filtered(x, y));
+      for (int x = 0; x < camera_.width(); ++x)
+        if (static_cast<int>(film_.pixel(x, y).samples()) == s && tiles_.areDoneAround(x, y, wave))
+          film_.add(x, y, filter_.at(x, y));
     });
   }
 
@@ -195,6 +216,7 @@ class GridRenderer {
   Film& film_;
   const RenderOptions& options_;
   Tiles tiles_;
+  GridFilter filter_;
   std::vector<SampleGrid> grids_;
 };
 
@@ -203,7 +225,7 @@ class ImageRenderer {
  public:
   ImageRenderer(const RayCamera& camera, const AddImageSample& addSample, const Film& film,
                 const RenderOptions& options, int border)
-      : addSample_(addSample), film_(film), options_(options), tiles_(camera, options, border) {}
+      : camera_(camera), addSample_(addSample), film_(film), options_(options), tiles_(camera, options, border) {}
 
   /// Adds samples until every pixel has `samples` of them.
   Wave render(int samples) {
@@ -211,7 +233,7 @@ class ImageRenderer {
     for (int s = static_cast<int>(film_.sampleRange().first); s < samples; ++s) {
       wave.complete = !isSet(options_.stop);
       if (!wave.complete) break;
-      wave.statistics += addSample_(OneSample(tiles_, options_, s));
+      wave.statistics += addSample_(OneSample(camera_, tiles_, options_, s));
     }
     return wave;
   }
@@ -219,10 +241,10 @@ class ImageRenderer {
  private:
   class OneSample : public ImageSample {
    public:
-    OneSample(const Tiles& tiles, const RenderOptions& options, int sample)
-        : tiles_(tiles), options_(options), sample_(sample) {}
+    OneSample(const RayCamera& camera, const Tiles& tiles, const RenderOptions& options, int sample)
+        : camera_(camera), tiles_(tiles), options_(options), sample_(sample) {}
     int index() const override { return static_cast<int>(options_.indexOf(sample_)); }
-    Vec2 offset() const override { return gridOffset(options_, sample_); }
+    Vec2 offset() const override { return gridOffset(camera_, options_, sample_); }
     int tiles() const override { return tiles_.count(); }
     PathStatistics forEachPixel(const VisitPixel& visit) const override {
       return tiles_
@@ -235,11 +257,13 @@ class ImageRenderer {
     }
 
    private:
+    const RayCamera& camera_;
     const Tiles& tiles_;
     const RenderOptions& options_;
     int sample_;
   };
 
+  const RayCamera& camera_;
   const AddImageSample& addSample_;
   const Film& film_;
   const RenderOptions& options_;
@@ -253,29 +277,29 @@ class BidirectionalSamples {
       : camera_(camera),
         integrator_(integrator),
         film_(film),
-        border_(border),
-        fromCamera_(camera.width(), camera.height(), camera.filter()),
-        fromLights_(camera) {}
+        fromCamera_(camera.width(), camera.height(), border),
+        fromLights_(camera) {
+    if (border > 0) filter_.emplace(camera.width(), camera.height(), camera.filter());
+  }
 
   PathStatistics add(const ImageSample& sample) {
     splats_.resize(sample.tiles());
     for (std::vector<Splat>& list : splats_) list.clear();
+    const Vec2 offset = sample.offset();
     PathStatistics statistics = storeLightPaths(sample);
     statistics +=
         sample.forEachPixel([&](int x, int y, int tile, Sampler& rng, Sampler& lightRng, PathStatistics& counts) {
-          const CameraSample place = border_ > 0 ? camera_.sample(sample.offset(), rng) : camera_.sample(rng);
+          const CameraSample place = filter_ ? camera_.sample(offset, rng) : camera_.sample(rng);
           // The light image is of one light path per pixel; that of the border serves its camera path alone.
           std::vector<Splat> unused;
           fromCamera_.at(x, y) = integrator_.radiance(camera_.rayThrough(x, y, place), rng, lightRng, counts,
                                                       isInImage(camera_, x, y) ? splats_[tile] : unused);
         });
     fromLights_.sum(splats_);
-    if (border_ > 0) fromCamera_.convolve(sample.offset());
+    if (filter_) filter_->apply(fromCamera_, offset);
     for (int y = 0; y < camera_.height(); ++y)
-      for (int x = 0; x < camera_.width(); ++x) {
-        const Rgb& fromCamera = border_ > 0 ? fromCamera_.filtered(x, y) : fromCamera_.at(x, y);
-        film_.add(x, y, fromCamera + fromLights_.at(x, y));
-      }
+      for (int x = 0; x < camera_.width(); ++x)
+        film_.add(x, y, (filter_ ? filter_->at(x, y) : fromCamera_.at(x, y)) + fromLights_.at(x, y));
     return statistics;
   }
 
@@ -297,8 +321,8 @@ class BidirectionalSamples {
   const RayCamera& camera_;
   BidirectionalIntegrator& integrator_;
   Film& film_;
-  int border_;
   SampleGrid fromCamera_;
+  std::optional<GridFilter> filter_;  // if there is a border
   LightImage fromLights_;
   std::vector<std::vector<Splat>> splats_;  // by tile
 };

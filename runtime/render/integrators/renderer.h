@@ -18,9 +18,12 @@ enum class PixelSampling { sobol, independent };
 
 /// How samples are weighted by the reconstruction filter. Both converge to the same image.
 enum class PixelFiltering {
-  splatting,  ///< a sample contributes to all pixels whose filter covers it (SampleGrid): less noise
-  importance  ///< it contributes to one pixel, for which it is sampled from the filter: the noise of pixels is
-              ///< independent
+  /// A sample contributes to all pixels whose filter covers it (sample_grid.h), which lowers the noise. The widest
+  /// filters, and images so small that their border would take more time than this is worth, use importance sampling.
+  splatting,
+  /// A sample contributes to one pixel, for which it is sampled from the filter, so that the noise of pixels is
+  /// independent.
+  importance
 };
 
 /// Exactly one of samples and seconds is set.
@@ -37,7 +40,8 @@ struct RenderOptions {
   /// not used. Its time is part of the rendering time.
   std::function<void()> withWave = {};
 
-  /// The random numbers of sample s, counted from firstSample, of a pixel, counted row by row from the top.
+  /// The random numbers of sample s, counted from firstSample, of a pixel, counted row by row from the top; with
+  /// splatting, among the pixels of the image and its border.
   Sampler sampler(std::uint64_t pixel, int s) const;
   /// The index of the sample s among all samples of its pixel.
   std::uint32_t indexOf(int s) const { return static_cast<std::uint32_t>(firstSample) + static_cast<std::uint32_t>(s); }
@@ -66,7 +70,7 @@ class ImageSample {
   virtual ~ImageSample() = default;
   /// Its index, RenderOptions::firstSample included.
   virtual int index() const = 0;
-  /// With PixelFiltering::splatting, the offset of its points from the centres of their pixels.
+  /// If there is a border, the offset of its points from the centres of their pixels.
   virtual Vec2 offset() const = 0;
   /// The number of tiles; the pixels of each are visited by one thread, in the same order on any number of threads.
   virtual int tiles() const = 0;
@@ -86,9 +90,7 @@ using AfterWave = std::function<void(const RenderResult&)>;
 /// Adds samples to the film, which must have the size of the camera's image. Sample s of pixel i, counted from
 /// firstSample, uses the random stream (seed, i, s). A film that already has samples is continued: each pixel gets the
 /// samples that it lacks, so that the result has the same bytes as that of an uninterrupted run. `before` is the result
-/// of the run that has filled the film. With PixelFiltering::splatting, a film that is continued must have equally many
-/// samples in all pixels, as films of such runs have: if they are stopped, up to 16 samples of each pixel are
-/// discarded.
+/// of the run that has filled the film.
 RenderResult render(const RayCamera& camera, const Integrator& integrator, Film& film, const RenderOptions& options,
                     const AfterWave& afterWave = {}, const RenderResult& before = {});
 /// The same for samples that are not only the radiance along a ray of their own pixel: addSample must add exactly one
