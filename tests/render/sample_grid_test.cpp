@@ -92,7 +92,7 @@ bool sameFilm(const Film& a, const Film& b) {
 }  // namespace
 
 TEST_CASE("sample grid: splatting and filter importance sampling converge to the same image") {
-  constexpr int kSamples = 1 << 12;
+  constexpr int kSamples = 1 << 11;
   for (const PixelFilter& filter : kFilters) {
     const auto film = [&](PixelFiltering filtering, PixelSampling sampling) {
       return renderPattern(filter, Pattern(edges), optionsOf(kSamples, filtering, sampling));

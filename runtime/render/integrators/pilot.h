@@ -27,7 +27,8 @@ struct PilotOptions {
 struct PilotResult {
   /// Relative variance of a pixel, mean of the channels: half the squared difference of the two pictures over
   /// m² + (median / 2)², without the worst 0.5 % of the pixels. m is the mean of the pixel's tile over all integrators,
-  /// because that of the pixel would be too noisy, and the median is that of the tiles' luminance.
+  /// because that of the pixel would be too noisy, and the median is that of the tiles' luminance. With samples of one
+  /// pixel only: PixelFiltering::splatting divides the variance of all integrators by the same factor.
   double variance = 0;
   double cost = 0;  ///< of a sample
   /// The relative variance of a picture times the time it takes.
