@@ -40,11 +40,19 @@ def make_page(tools, folder):
     peer.mkdir()
     make_peer(tools, peer)
     evaluate = [ROOT / "scripts/evaluate", out, "--scenes", "jewelry", "--methods", "path", "--method",
-                "depth-2=--integrator path --max-depth 2", "--spp", "1", "2", "--build", f"a={tools}", "--import", "peer", peer]
+                "depth-2.0=--integrator path --max-depth 2", "--fit", "depth-2.0=--quality 0.1", "--spp", "1", "2",
+                "--build", f"a={tools}", "--import", "peer", peer]
     subprocess.run(evaluate, check=True)
     before = {path: path.stat().st_mtime_ns for path in (out / "runs").rglob("*.exr")}
     subprocess.run(evaluate, check=True)
     assert before == {path: path.stat().st_mtime_ns for path in (out / "runs").rglob("*.exr")}, "complete runs are repeated"
+    assert {folder.name for folder in (out / "caches").iterdir() if folder.is_dir()} == {"a", "a+depth-2.0"}, "caches of their own"
+    record = next((out / "runs").rglob("*.run"))
+    of_these_tools = record.read_text()
+    record.write_text(of_these_tools.replace('"loberender": "', '"loberender": "0'))
+    other = subprocess.run(evaluate, capture_output=True, text=True)
+    assert other.returncode == 1 and "by other tools" in other.stderr, f"pictures of other tools are mixed: {other.stderr}"
+    record.write_text(of_these_tools)
     subprocess.run([ROOT / "scripts/report", out, "--tools", tools], check=True)
     return out / "report.html"
 
@@ -82,7 +90,7 @@ def check(driver):
     assert len(scene.find_elements(By.CSS_SELECTOR, "svg circle")) == 5, "the chart does not have a point for each budget, and the peer's"
     assert scene.find_element(By.CSS_SELECTOR, "svg").text.count("slope") == 2, "slopes are not shown"
     header = [cell.text for cell in driver.find_elements(By.CSS_SELECTOR, "#table th")]
-    assert header == ["", "a:path", "a:depth-2", "peer"], header
+    assert header == ["", "a:path", "a:depth-2.0", "peer"], header
     peers = [row.find_elements(By.TAG_NAME, "td")[3].text for row in driver.find_elements(By.CSS_SELECTOR, "#table tbody tr")]
     assert len(peers) == 2 and peers[0] == peers[1] and peers[0].endswith(", 1.6 s"), peers
     before = scene.find_element(By.CSS_SELECTOR, ".chart svg").get_attribute("outerHTML")
