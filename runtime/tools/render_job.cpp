@@ -10,14 +10,9 @@
 
 #include "runtime/image/image_output.h"
 #include "runtime/tools/tool.h"
+#include "scenes/camera.h"
 
 namespace lobe {
-namespace {
-
-constexpr std::int64_t kMaxPixels = 1 << 28;  // larger sizes are assumed to be typing errors
-
-}  // namespace
-
 const char* nameOf(IntegratorKind kind) {
   constexpr std::array names{"auto", "path", "bdpt", "vcm", "guided", "product"};
   return names[static_cast<std::size_t>(kind)];
@@ -61,8 +56,9 @@ void RenderJob::validate() const {
           "--save-illumination cannot be combined with --illumination, which replaces training, unless --passes or "
           "--train-seconds continue the training");
   require(!seconds || (*seconds > 0 && std::isfinite(*seconds)), "--seconds must be a finite number greater than 0");
-  require(!size || (size->first >= 1 && size->second >= 1 && std::int64_t{size->first} * size->second <= kMaxPixels),
-          fmt::format("--size must be at least 1x1 and at most {} pixels", kMaxPixels));
+  require(
+      !size || (size->first >= 1 && size->second >= 1 && std::int64_t{size->first} * size->second <= kMaxPicturePixels),
+      fmt::format("--size must be at least 1x1 and at most {} pixels", kMaxPicturePixels));
   require(!maxDepth || *maxDepth >= 1, "--max-depth must be at least 1");
   require(!trainSeconds || (*trainSeconds > 0 && std::isfinite(*trainSeconds)),
           "--train-seconds must be a finite number greater than 0");

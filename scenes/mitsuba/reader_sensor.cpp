@@ -72,18 +72,29 @@ struct FilmSize {
   std::optional<FilmCrop> crop;
 };
 
+void checkPicture(int width, int height) {
+  if (std::int64_t{width} * height > kMaxPicturePixels)
+    throw ParameterError("width", fmt::format("a picture of {}x{} pixels is too large: at most {} pixels are supported",
+                                              width, height, kMaxPicturePixels));
+}
+
+std::optional<FilmCrop> readCrop(const Parameters& parameters, int filmWidth, int filmHeight) {
+  if (std::ranges::none_of(kCropParameters, [&](const char* name) { return parameters.has(name); })) return {};
+  FilmCrop crop;
+  crop.x = readPixels(parameters, "crop_offset_x", 0, 0, filmWidth - 1);
+  crop.y = readPixels(parameters, "crop_offset_y", 0, 0, filmHeight - 1);
+  crop.width = readPixels(parameters, "crop_width", filmWidth - crop.x, 1, filmWidth - crop.x);
+  crop.height = readPixels(parameters, "crop_height", filmHeight - crop.y, 1, filmHeight - crop.y);
+  return crop;
+}
+
 FilmSize readSize(const Parameters& parameters, const Camera& camera) {
   constexpr int kLargest = 1 << 16;
   FilmSize size;
   size.width = readPixels(parameters, "width", camera.width, 1, kLargest);
   size.height = readPixels(parameters, "height", camera.height, 1, kLargest);
-  if (std::ranges::none_of(kCropParameters, [&](const char* name) { return parameters.has(name); })) return size;
-  FilmCrop crop;
-  crop.x = readPixels(parameters, "crop_offset_x", 0, 0, size.width - 1);
-  crop.y = readPixels(parameters, "crop_offset_y", 0, 0, size.height - 1);
-  crop.width = readPixels(parameters, "crop_width", size.width - crop.x, 1, size.width - crop.x);
-  crop.height = readPixels(parameters, "crop_height", size.height - crop.y, 1, size.height - crop.y);
-  size.crop = crop;
+  size.crop = readCrop(parameters, size.width, size.height);
+  checkPicture(size.crop ? size.crop->width : size.width, size.crop ? size.crop->height : size.height);
   return size;
 }
 

@@ -1,6 +1,7 @@
 // Faults in scene files: each is reported in one line with the exact location, the offending text and the known names.
 // Lenient reading leaves out or replaces them.
 
+#include <fmt/format.h>
 #include <catch2/catch.hpp>
 
 #include "tests/support/scenes_test_tools.h"
@@ -173,6 +174,15 @@ TEST_CASE("scenes: invalid cameras and crops are rejected") {
   checkFault(fault("perspective", film + "<integer name=\"cropWidth\" value=\"91\"/>"
                                          "<integer name=\"cropOffsetX\" value=\"10\"/></film>"),
              "3:1", {"crop_width", "1 to 90", "91"});
+  // The limit is 2^28 pixels, of the crop if there is one.
+  const auto sized = [&](int height, const std::string& crop) {
+    return fault("perspective", "<film type=\"hdrfilm\"><integer name=\"width\" value=\"65536\"/>" +
+                                    fmt::format("<integer name=\"height\" value=\"{}\"/>", height) + crop + "</film>");
+  };
+  CHECK(sized(4096, "") == "");
+  checkFault(sized(4097, ""), "2:22", {"65536x4097", "at most 268435456 pixels"});
+  CHECK(sized(65536, "<integer name=\"cropHeight\" value=\"4096\"/>") == "");
+  checkFault(sized(65536, "<integer name=\"cropHeight\" value=\"5000\"/>"), "2:22", {"65536x5000"});
 }
 
 TEST_CASE("scenes: missing and damaged files are reported with the scene and the file") {
@@ -219,6 +229,9 @@ TEST_CASE("scenes: invalid groups and instances are rejected") {
   CHECK_THAT(faultOf("<shape type=\"instance\"><shape type=\"cube\"/></shape>"), Catch::Contains("one shapegroup"));
   CHECK_THAT(faultOf(group("<shape type=\"sphere\"><emitter type=\"area\"/></shape>")), Catch::Contains("cannot emit"));
   CHECK_THAT(faultOf(group("<shape type=\"shapegroup\"/>")), Catch::Contains("plain shapes only"));
+  CHECK_THAT(faultOf(group("<shape type=\"instance\"><ref id=\"g\"/></shape>") +
+                     "<shape type=\"instance\"><ref id=\"g\"/></shape>"),
+             Catch::Contains("2:33: shape \"instance\" inside a shapegroup"));
   CHECK_THAT(faultOf(group("") + "<shape type=\"instance\"><ref id=\"g\"/><transform name=\"toWorld\"><scale x=\"0\"/>"
                                  "</transform></shape>"),
              Catch::Contains("singular"));
