@@ -1,7 +1,11 @@
 #include "scenes/meshes/obj.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <map>
 #include <span>
+#include <string_view>
+#include <unordered_map>
 
 #include <fmt/format.h>
 
@@ -38,9 +42,13 @@ void select(ObjData& data, const ObjSelection& selection) {
 
 /// For each of the data's materials, its index in `wanted`, or the size of `wanted` if it is not there.
 std::vector<std::size_t> partsOfMaterials(const ObjData& data, const std::vector<std::string>& wanted) {
+  std::map<std::string_view, std::size_t> indices;
+  for (std::size_t i = 0; i < wanted.size(); ++i) indices.try_emplace(wanted[i], i);
   std::vector<std::size_t> parts;
-  for (const std::string& name : data.materials)
-    parts.push_back(static_cast<std::size_t>(std::ranges::find(wanted, name) - wanted.begin()));
+  for (const std::string& name : data.materials) {
+    const auto entry = indices.find(name);
+    parts.push_back(entry == indices.end() ? wanted.size() : entry->second);
+  }
   return parts;
 }
 
@@ -59,28 +67,30 @@ std::vector<std::vector<Run>> divide(const ObjData& data, const ObjSelection& se
 
 // ---- From corners to vertices
 
-/// Creates one vertex for each distinct corner of a run. Few corners share a position, so they are searched linearly.
+struct CornerHash {
+  std::size_t operator()(const Corner& corner) const {
+    std::uint64_t hash = 0;
+    for (const int index : {corner.position, corner.uv, corner.normal})
+      hash = (hash + static_cast<std::uint32_t>(index)) * 0x9e3779b97f4a7c15;  // 2^64 divided by the golden ratio
+    return hash;
+  }
+};
+
+/// Creates one vertex for each distinct corner of a run.
 class RunBuilder {
  public:
-  explicit RunBuilder(const ObjData& data) : data_(data), first_(data.positions.size(), kNone) {}
+  explicit RunBuilder(const ObjData& data) : data_(data) {}
 
   TriangleMesh build(const Run& run, bool faceNormals) {
     useWhatIsThere(run, faceNormals);
     TriangleMesh mesh;
     mesh.triangles.reserve(run.size());
+    vertices_.reserve(run.size());
     for (const Face& face : run) addFace(face, mesh);
-    // Only used entries are reset, because a file may have many runs of few faces.
-    for (const Entry& entry : entries_) first_[entry.corner.position] = kNone;
-    entries_.clear();
     return mesh;
   }
 
  private:
-  struct Entry {
-    Corner corner;
-    int next;
-  };
-
   std::span<const Corner> cornersOf(const Face& face) const {
     return {data_.corners.begin() + static_cast<std::ptrdiff_t>(face.begin), face.end - face.begin};
   }
@@ -104,23 +114,16 @@ class RunBuilder {
 
   std::uint32_t vertexOf(Corner corner, TriangleMesh& mesh) {
     if (!useNormals_) corner.normal = kNone;
-    int* link = &first_[corner.position];
-    while (*link != kNone) {
-      Entry& entry = entries_[*link];
-      if (entry.corner.uv == corner.uv && entry.corner.normal == corner.normal) return *link;
-      link = &entry.next;
-    }
-    *link = static_cast<int>(entries_.size());
-    entries_.push_back({corner, kNone});  // invalidates link
+    const auto [entry, isNew] = vertices_.try_emplace(corner, static_cast<std::uint32_t>(mesh.positions.size()));
+    if (!isNew) return entry->second;
     mesh.positions.push_back(data_.positions[corner.position]);
     if (useNormals_) mesh.normals.push_back(data_.normals[corner.normal]);
     if (useUvs_) mesh.uvs.push_back(corner.uv == kNone ? Vec2(0, 0) : data_.uvs[corner.uv]);
-    return static_cast<std::uint32_t>(entries_.size() - 1);
+    return entry->second;
   }
 
   const ObjData& data_;
-  std::vector<int> first_;  // index of the first entry for each position
-  std::vector<Entry> entries_;
+  std::unordered_map<Corner, std::uint32_t, CornerHash> vertices_;
   std::vector<std::uint32_t> ids_;
   bool useNormals_ = false, useUvs_ = false;
 };
@@ -138,10 +141,10 @@ void append(TriangleMesh& mesh, const TriangleMesh& more) {
   for (const auto& [i, j, k] : more.triangles) mesh.triangles.push_back({first + i, first + j, first + k});
 }
 
-TriangleMesh buildPart(const std::vector<Run>& runs, RunBuilder& builder, const MeshOptions& options) {
+TriangleMesh buildPart(const ObjData& data, const std::vector<Run>& runs, const MeshOptions& options) {
   TriangleMesh mesh;
   for (const Run& run : runs) {
-    TriangleMesh more = toWorldMesh(builder.build(run, options.faceNormals), options);
+    TriangleMesh more = toWorldMesh(RunBuilder(data).build(run, options.faceNormals), options);
     if (mesh.triangles.empty())
       mesh = std::move(more);
     else
@@ -162,9 +165,8 @@ std::vector<TriangleMesh> readObjByMaterial(const std::filesystem::path& path, c
     ObjData data = parseObj(readFile(path));
     select(data, selection);
     if (data.faces.empty()) throw std::runtime_error("has no triangles");
-    RunBuilder builder(data);
     std::vector<TriangleMesh> meshes;
-    for (const std::vector<Run>& runs : divide(data, selection)) meshes.push_back(buildPart(runs, builder, options));
+    for (const std::vector<Run>& runs : divide(data, selection)) meshes.push_back(buildPart(data, runs, options));
     return meshes;
   });
 }

@@ -14,6 +14,7 @@ struct ObjData {
   /// Indices from zero into the lists below; kNone for an attribute that the corner does not have.
   struct Corner {
     int position, uv, normal;
+    bool operator==(const Corner&) const = default;
   };
   /// The material is an index into ObjData::materials. A mesh ends where a `g` or `usemtl` follows faces; the meshes of
   /// the file are numbered from zero.

@@ -145,6 +145,48 @@ TEST_CASE("scenes: triangulating a polygon with many corners takes at most quadr
   CHECK(area == Approx(expected));
 }
 
+TEST_CASE("scenes: an OBJ with many texture coordinates at a position is read in linear time") {
+  constexpr int kFaces = 100000;
+  std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+  for (int i = 0; i < 2 * kFaces; ++i) text += fmt::format("vt {} 0\n", i);
+  for (int i = 0; i < kFaces; ++i) text += fmt::format("f 1/{} 2/{} 3/1\n", 2 * i + 1, 2 * i + 2);
+  text += "f 1/1 2/2 3/1\n";
+  const TestFolder folder;
+  const std::filesystem::path path = folder.write("a.obj", text);
+  const auto start = std::chrono::steady_clock::now();
+  const TriangleMesh mesh = readObj(path, {});
+  const std::chrono::duration<double> time = std::chrono::steady_clock::now() - start;
+  if (!kSanitized) CHECK(time.count() < 5);
+  CHECK(mesh.positions.size() == 2 * kFaces + 1);
+  // Vertices are in the order in which faces mention them first.
+  CHECK(mesh.triangles[0] == std::array<std::uint32_t, 3>{0, 1, 2});
+  CHECK(mesh.triangles[1] == std::array<std::uint32_t, 3>{3, 4, 2});
+  CHECK(mesh.triangles.back() == mesh.triangles[0]);
+  CHECK(mesh.uvs[4].x() == 3);
+}
+
+TEST_CASE("scenes: an OBJ is split into many materials in linear time") {
+  constexpr int kMaterials = 100000;
+  std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 2 0\nf 1 2 3\n";
+  ObjSelection selection;
+  for (int i = 0; i < kMaterials; ++i) {
+    selection.materials.push_back(fmt::format("material {}", i));
+    text += fmt::format("usemtl material {}\nf 1 2 4\n", i);
+  }
+  selection.materials.push_back("material 0");  // the first one of a name has the faces
+  const TestFolder folder;
+  const std::filesystem::path path = folder.write("a.obj", text);
+  const auto start = std::chrono::steady_clock::now();
+  const std::vector<TriangleMesh> meshes = readObjByMaterial(path, {}, selection);
+  const std::chrono::duration<double> time = std::chrono::steady_clock::now() - start;
+  if (!kSanitized) CHECK(time.count() < 5);
+  REQUIRE(meshes.size() == kMaterials + 2);
+  CHECK(areaOf(meshes.front()) == Approx(1));
+  CHECK(areaOf(meshes[kMaterials - 1]) == Approx(1));
+  CHECK(meshes[kMaterials].triangles.empty());
+  CHECK(areaOf(meshes.back()) == Approx(0.5));
+}
+
 TEST_CASE("scenes: PLY faces may precede vertices") {
   const TestFolder folder;
   const TriangleMesh mesh = readPly(
