@@ -1,5 +1,6 @@
 #include "scenes/meshes/serialized.h"
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
 #include <limits>
@@ -91,12 +92,18 @@ class Inflater {
     return result;
   }
 
-  /// The count comes from the file, so it is checked before memory is allocated.
+  /// The count comes from the file, so it is checked, and memory is allocated in blocks as the data is found.
   template <class T>
   std::vector<T> values(std::uint64_t count) {
+    constexpr std::uint64_t kBlock = 1 << 20;
     if (count > kMaxExpansion * packed_.size() / sizeof(T)) throw std::runtime_error("an element count is damaged");
-    std::vector<T> result(count);
-    fill(result.data(), count * sizeof(T));
+    std::vector<T> result;
+    while (result.size() < count) {
+      const std::uint64_t begin = result.size(), size = std::min(kBlock, count - begin);
+      if (begin + size > result.capacity()) result.reserve(std::min(count, 2 * begin + kBlock));
+      result.resize(begin + size);
+      fill(&result[begin], size * sizeof(T));
+    }
     return result;
   }
 
@@ -149,13 +156,19 @@ void readTriangles(Inflater& in, std::uint64_t count, TriangleMesh& mesh) {
       throw std::runtime_error(fmt::format("a triangle refers to vertex {} of {}", index, mesh.positions.size()));
 }
 
+void skipName(Inflater& in) {
+  constexpr int kLongest = 1 << 16;
+  for (int length = 0; in.value<char>() != '\0'; ++length)
+    if (length == kLongest) throw std::runtime_error(fmt::format("the mesh's name is longer than {} bytes", kLongest));
+}
+
 TriangleMesh unpack(Inflater& in, int version, bool& faceNormals) {
   const auto flags = in.value<std::uint32_t>();
-  if (version == 4)
-    while (in.value<char>() != '\0') continue;  // its name
+  if (version == 4) skipName(in);
   const auto vertices = in.value<std::uint64_t>();
   const auto triangles = in.value<std::uint64_t>();
   if (vertices > std::numeric_limits<std::uint32_t>::max()) throw std::runtime_error("more than 2^32 vertices");
+  if (triangles > std::numeric_limits<std::uint32_t>::max()) throw std::runtime_error("more than 2^32 triangles");
   faceNormals = faceNormals || (flags & kFaceNormals);
   TriangleMesh mesh;
   if (flags & kDoublePrecision)

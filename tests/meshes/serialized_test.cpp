@@ -2,6 +2,9 @@
 
 #include <cstring>
 #include <fstream>
+#include <random>
+
+#include <sys/resource.h>
 
 #include <zlib.h>
 #include <catch2/catch.hpp>
@@ -25,6 +28,8 @@ struct Written {
   std::uint64_t vertices = 3, triangles = 1;
   std::uint32_t lastIndex = 2;
   float shift = 0;  ///< added to x
+  std::string name = "a name";
+  std::string rest;  ///< bytes after the triangle
 };
 
 template <class Real>
@@ -50,11 +55,12 @@ std::string compressed(const std::string& data) {
 std::string meshBytes(const Written& mesh) {
   std::string data;
   put(data, mesh.flags);
-  if (mesh.version == 4) data += std::string("a name") + '\0';
+  if (mesh.version == 4) data += mesh.name + '\0';
   put(data, mesh.vertices);
   put(data, mesh.triangles);
   data += mesh.flags & 0x2000 ? vertexData<double>(mesh) : vertexData<float>(mesh);
   for (const std::uint32_t i : {0u, 1u, mesh.lastIndex}) put(data, i);
+  data += mesh.rest;
   std::string bytes;
   put<std::uint16_t>(bytes, 0x041c);
   put(bytes, mesh.version);
@@ -75,6 +81,13 @@ std::string fileOf(const std::vector<Written>& meshes) {
       put(bytes, static_cast<std::uint32_t>(offset));
   put(bytes, static_cast<std::uint32_t>(offsets.size()));
   return bytes;
+}
+
+/// The most memory that this process has had, in kB.
+long peakMemory() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return usage.ru_maxrss;
 }
 
 TriangleMesh read(const std::string& bytes, int index = 0, const MeshOptions& options = {}) {
@@ -129,10 +142,53 @@ TEST_CASE("scenes: malformed serialized meshes are rejected") {
   bad.vertices = std::uint64_t{1} << 62;
   CHECK_THROWS_WITH(read(fileOf({bad})), Contains("2^32"));
   bad = good;
-  bad.triangles = std::uint64_t{1} << 62;
+  bad.triangles = std::uint64_t{1} << 31;
   CHECK_THROWS_WITH(read(fileOf({bad})), Contains("damaged"));
+  bad.triangles = 0x5555555555555556;  // three times this is 2, because the product overflows
+  CHECK_THROWS_WITH(read(fileOf({bad})), Contains("more than 2^32 triangles"));
   bad.triangles = 2;
   CHECK_THROWS_WITH(read(fileOf({bad})), Contains("damaged or truncated"));
+}
+
+TEST_CASE("scenes: a serialized mesh may have a name of up to 65536 bytes") {
+  Written mesh;
+  mesh.name = std::string(65536, 'a');
+  CHECK(read(fileOf({mesh})).positions.size() == 3);
+  mesh.name += 'a';
+  CHECK_THROWS_WITH(read(fileOf({mesh})), Contains("a.serialized: the mesh's name is longer than 65536 bytes"));
+}
+
+TEST_CASE("scenes: large serialized meshes are read completely") {
+  Written mesh;
+  mesh.flags = 0x1010;
+  mesh.vertices = 1000000;
+  mesh.triangles = 500000;
+  // The first three vertices are those of all meshes here, and the fourth has the bits of what is otherwise a triangle.
+  for (std::uint32_t i = 4; i < mesh.vertices; ++i)
+    for (const std::uint32_t x : {i, i + 1, i + 2}) put(mesh.rest, static_cast<float>(x));
+  for (std::uint32_t i = 0; i < mesh.triangles; ++i)
+    for (const std::uint32_t index : {i, i + 1, i + 2}) put(mesh.rest, index);
+  const TriangleMesh result = read(fileOf({mesh}));
+  REQUIRE(result.positions.size() == mesh.vertices);
+  REQUIRE(result.triangles.size() == mesh.triangles);
+  std::uint32_t wrong = 0;
+  for (std::uint32_t i = 4; i < mesh.vertices; ++i)
+    wrong += result.positions[i] != Vec3(static_cast<float>(i), static_cast<float>(i + 1), static_cast<float>(i + 2));
+  for (std::uint32_t i = 0; i < mesh.triangles; ++i)
+    wrong += result.triangles[i] != std::array<std::uint32_t, 3>{i, i + 1, i + 2};
+  CHECK(wrong == 0);
+}
+
+TEST_CASE("scenes: a serialized mesh that claims more than it has takes no memory for it") {
+  Written claim;
+  // A file of a thousandth of what it claims.
+  std::minstd_rand random;
+  for (int i = 0; i < 1 << 20; ++i) claim.rest += static_cast<char>(random() >> 8);
+  claim.vertices = 50000000;
+  const std::string bytes = fileOf({claim});
+  const long before = peakMemory();
+  CHECK_THROWS_WITH(read(bytes), Contains("damaged or truncated"));
+  CHECK(peakMemory() - before < 100000);  // of 600000
 }
 
 TEST_CASE("scenes: serialized meshes with any wrong or missing byte never crash") {
