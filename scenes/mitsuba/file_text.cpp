@@ -91,6 +91,20 @@ std::string toUtf8(const std::filesystem::path& path, std::string_view bytes, co
   return text;
 }
 
+/// Of LineIndex::continuations.
+constexpr std::size_t kBlock = 4096;
+
+/// The number of bytes that continue UTF-8 characters.
+std::size_t continuationsIn(std::string_view text) {
+  return static_cast<std::size_t>(std::ranges::count_if(text, [](char c) { return (c & 0xc0) == 0x80; }));
+}
+
+/// The number of characters before the offset.
+std::size_t charactersBefore(std::string_view text, const LineIndex& lines, std::size_t offset) {
+  const std::size_t block = offset / kBlock;
+  return offset - lines.continuations[block] - continuationsIn(text.substr(block * kBlock, offset % kBlock));
+}
+
 }  // namespace
 
 std::string readXmlText(const std::filesystem::path& path) {
@@ -101,25 +115,25 @@ std::string readXmlText(const std::filesystem::path& path) {
   return isUtf8(encoding) ? bytes : toUtf8(path, bytes, encoding);
 }
 
-std::vector<std::size_t> lineStarts(std::string_view text) {
-  std::vector<std::size_t> starts = {0};
+LineIndex indexLines(std::string_view text) {
+  LineIndex lines{{0}, {0}};
   for (std::size_t i = 0; i < text.size(); ++i)
-    if (text[i] == '\n') starts.push_back(i + 1);
-  return starts;
+    if (text[i] == '\n') lines.starts.push_back(i + 1);
+  for (std::size_t begin = 0; begin + kBlock <= text.size(); begin += kBlock)
+    lines.continuations.push_back(lines.continuations.back() + continuationsIn(text.substr(begin, kBlock)));
+  return lines;
 }
 
 std::string placeIn(const std::filesystem::path& path, std::string_view text, std::size_t offset) {
-  return placeIn(path, text, lineStarts(text), offset);
+  return placeIn(path, text, indexLines(text), offset);
 }
 
-std::string placeIn(const std::filesystem::path& path, std::string_view text, const std::vector<std::size_t>& lines,
+std::string placeIn(const std::filesystem::path& path, std::string_view text, const LineIndex& lines,
                     std::size_t offset) {
   offset = std::min(offset, text.size());
-  const auto next = std::ranges::upper_bound(lines, offset);
-  const std::string_view before = text.substr(*(next - 1), offset - *(next - 1));
-  // Continuation bytes of UTF-8 characters are not counted.
-  const auto column = std::ranges::count_if(before, [](char c) { return (c & 0xc0) != 0x80; }) + 1;
-  return fmt::format("{}:{}:{}", path.string(), next - lines.begin(), column);
+  const auto next = std::ranges::upper_bound(lines.starts, offset);
+  const std::size_t column = charactersBefore(text, lines, offset) - charactersBefore(text, lines, *(next - 1)) + 1;
+  return fmt::format("{}:{}:{}", path.string(), next - lines.starts.begin(), column);
 }
 
 }  // namespace lobe

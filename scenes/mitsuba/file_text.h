@@ -14,13 +14,17 @@ namespace lobe {
 /// encoding.
 std::string readXmlText(const std::filesystem::path& path);
 
-/// The offsets at which the lines of a text begin.
-std::vector<std::size_t> lineStarts(std::string_view text);
+/// Where the lines of a UTF-8 text begin, and where its characters have several bytes.
+struct LineIndex {
+  std::vector<std::size_t> starts;         ///< offsets of the lines
+  std::vector<std::size_t> continuations;  ///< for each block of the text, how many bytes before it continue characters
+};
+LineIndex indexLines(std::string_view text);
 
 /// "FILE:LINE:COLUMN" of an offset in a file's text; columns count characters from one.
 std::string placeIn(const std::filesystem::path& path, std::string_view text, std::size_t offset);
-/// The same for a text whose lineStarts are known.
-std::string placeIn(const std::filesystem::path& path, std::string_view text, const std::vector<std::size_t>& lines,
+/// The same for a text that has been indexed, in a time that does not depend on its length.
+std::string placeIn(const std::filesystem::path& path, std::string_view text, const LineIndex& lines,
                     std::size_t offset);
 
 }  // namespace lobe

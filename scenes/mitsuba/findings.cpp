@@ -55,7 +55,7 @@ void Findings::fault(std::string where, const std::string& kind, std::string mes
   const auto [entry, isNew] = faultOfKind_.try_emplace(kind, faults_.size());
   if (isNew && faults_.size() >= kMostKinds) throw SceneError(faults_);
   // Definitions are read again after each included file, so the same fault may be reported twice.
-  if (!places_.insert(fmt::format("{} {}", where, kind)).second) return;
+  if (!places_.emplace(entry->second, where).second) return;
   if (isNew)
     faults_.push_back({std::move(where), std::move(message), std::move(consequence)});
   else
@@ -71,14 +71,14 @@ void Findings::warn(const std::string& where, const std::string& kind, const std
 }
 
 void Findings::note(std::string text) {
-  if (std::ranges::find(notes_, text) == notes_.end()) notes_.push_back(std::move(text));
+  if (knownNotes_.insert(text).second) notes_.push_back(std::move(text));
 }
 
 void Findings::noteWithoutEffect(const std::string& owner, const std::string& parameter) {
-  auto entry = std::ranges::find(withoutEffect_, owner, &WithoutEffect::owner);
-  if (entry == withoutEffect_.end()) entry = withoutEffect_.insert(entry, {owner, {}});
-  if (std::ranges::find(entry->parameters, parameter) == entry->parameters.end())
-    entry->parameters.push_back(parameter);
+  if (!knownWithoutEffect_.emplace(owner, parameter).second) return;
+  const auto [entry, isNew] = withoutEffectOf_.try_emplace(owner, withoutEffect_.size());
+  if (isNew) withoutEffect_.push_back({owner, {}});
+  withoutEffect_[entry->second].parameters.push_back(parameter);
 }
 
 std::vector<std::string> Findings::warnings() const {

@@ -7,6 +7,7 @@
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace lobe {
@@ -66,8 +67,10 @@ class Findings {
     std::string owner;
     std::vector<std::string> parameters;
   };
-  std::map<std::string, std::size_t> faultOfKind_, warningOfKind_;  // indices
-  std::set<std::string> places_;                                    // locations of faults with their kinds
+  std::map<std::string, std::size_t> faultOfKind_, warningOfKind_, withoutEffectOf_;  // indices
+  std::set<std::pair<std::size_t, std::string>> places_;                              // of faults, by their index
+  std::set<std::string> knownNotes_;
+  std::set<std::pair<std::string, std::string>> knownWithoutEffect_;  // owner and parameter
   std::set<std::filesystem::path> files_;
   std::vector<Fault> faults_;
   std::vector<Warning> warnings_;

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <optional>
+#include <ranges>
 #include <vector>
 
 #include <fmt/format.h>
@@ -18,6 +19,13 @@ namespace {
 
 // Limits on expansion: definitions that use each other, and files that include each other, can grow exponentially.
 constexpr std::size_t kLongestValue = 1 << 20, kMostIncludes = 1000, kLongestText = std::size_t{1} << 28;
+
+/// Up to ten of the names, and the number of others.
+std::string listed(const auto& names) {
+  constexpr std::size_t kMost = 10;
+  const std::string some = fmt::format("{}", fmt::join(names | std::views::take(kMost), ", "));
+  return names.size() > kMost ? fmt::format("{} and {} more", some, names.size() - kMost) : some;
+}
 
 bool isNameCharacter(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) || c == '_';
@@ -110,7 +118,7 @@ SceneFile::SceneFile(const std::filesystem::path& path, const std::map<std::stri
       text_(files_[0].text),
       segments_{{0, 0, 0}},
       values_(definitions) {
-  files_[0].lines = lineStarts(text_);
+  files_[0].lines = indexLines(text_);
   do {
     throwIfCancelled();
     parse();
@@ -211,7 +219,7 @@ std::size_t SceneFile::addFile(pugi::xml_node include) {
     if (file == 0) break;
   }
   files_.push_back({path, readXmlText(path), parent, {}});
-  files_.back().lines = lineStarts(files_.back().text);
+  files_.back().lines = indexLines(files_.back().text);
   return files_.size() - 1;
 }
 
@@ -270,7 +278,7 @@ std::string SceneFile::substituted(const std::string& text, pugi::xml_node node)
     if (it == values_.end())
       fault(node,
             fmt::format("${} is not defined: neither by a <default> nor by -D{}", name,
-                        values_.empty() ? "" : fmt::format("; defined are {}", fmt::join(names(), ", "))),
+                        values_.empty() ? "" : fmt::format("; defined are {}", listed(std::views::keys(values_)))),
             "the element is left out");
     result += it == values_.end() ? "$" + name : it->second;
     if (result.size() > kLongestValue)
@@ -289,17 +297,11 @@ void SceneFile::checkDefinitionsUsed(const std::map<std::string, std::string>& d
   for (const auto& [name, value] : definitions)
     if (!uses(name) && !(other && other->uses(name)))
       fail(scene_, fmt::format("-D defines ${}, which the scene does not use; it uses {}", name,
-                               usedNames_.empty() ? "none" : fmt::format("{}", fmt::join(usedNames_, ", "))));
+                               usedNames_.empty() ? "none" : listed(usedNames_)));
 }
 
 bool SceneFile::hasUndefinedName(pugi::xml_node node) {
   return std::ranges::any_of(node.attributes(), [](pugi::xml_attribute a) { return std::strchr(a.value(), '$'); });
-}
-
-std::vector<std::string> SceneFile::names() const {
-  std::vector<std::string> result;
-  for (const auto& [name, value] : values_) result.push_back(name);
-  return result;
 }
 
 void SceneFile::indexIds(pugi::xml_node node) {

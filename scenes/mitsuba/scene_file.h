@@ -15,6 +15,7 @@
 
 #include <pugixml.hpp>
 
+#include "scenes/mitsuba/file_text.h"
 #include "scenes/mitsuba/findings.h"
 
 namespace lobe {
@@ -70,8 +71,8 @@ class SceneFile {
   struct File {
     std::filesystem::path path;
     std::string text;
-    std::size_t parent;              // the file that includes it; the first file is its own parent
-    std::vector<std::size_t> lines;  // offsets at which they begin in the text
+    std::size_t parent;  // the file that includes it; the first file is its own parent
+    LineIndex lines;     // of the text
   };
   /// The text from begin to the next segment comes from a file, starting at offset.
   struct Segment {
@@ -96,7 +97,6 @@ class SceneFile {
   const Segment& segmentAt(std::size_t offset) const;
   void substitute(pugi::xml_node node);
   std::string substituted(const std::string& text, pugi::xml_node node);
-  std::vector<std::string> names() const;  // of all values
   void indexIds(pugi::xml_node node);
   void indexAliases();
 

@@ -1,9 +1,12 @@
 // Files with several faults, files for older versions, and encodings: what is reported, and what is read nevertheless.
 
+#include <chrono>
+
 #include <fmt/format.h>
 #include <catch2/catch.hpp>
 
 #include "runtime/core/parallel.h"
+#include "scenes/mitsuba/findings.h"
 #include "tests/support/scenes_test_tools.h"
 
 namespace lobe {
@@ -259,6 +262,52 @@ TEST_CASE("scenes: small files that would expand exponentially are rejected") {
                     i + 1));
   folder.write("40.xml", "<scene version=\"3.0.0\"/>");
   CHECK_THROWS_WITH(readScene(folder.path() / "0.xml"), Catch::Contains("more than 1000 <include>s"));
+}
+
+TEST_CASE("scenes: many faults in a single line take neither much time nor much memory") {
+  std::string body;
+  for (int i = 0; i < 20000; ++i) body += fmt::format("<default name=\"a{:05}\" value=\"\xc3\xa4\"/>", i);
+  for (int i = 0; i < 100000; ++i) body += "<bsdf type=\"$none\"/>";
+  const auto start = std::chrono::steady_clock::now();
+  const SceneCheck found = check(sceneOf(body));
+  const std::chrono::duration<double> time = std::chrono::steady_clock::now() - start;
+  CHECK(time.count() < 20);
+  REQUIRE(found.faults.size() == 1);
+  CHECK(found.faults[0].count == 100000);
+  // Each <default> has 34 characters, one of which has two bytes.
+  CHECK_THAT(found.faults[0].text(), Catch::Contains("test.xml:2:680001: $none is not defined"));
+  CHECK_THAT(found.faults[0].text(), Catch::Contains("defined are a00000, a00001, ") &&
+                                         Catch::Contains(", a00009 and 19990 more") && !Catch::Contains("a00010"));
+}
+
+TEST_CASE("scenes: columns are counted in characters, also at the ends of long lines") {
+  for (const int count : {0, 1, 4000, 100000}) {
+    std::string line;
+    for (int i = 0; i < count; ++i) line += "\xe2\x82\xac";
+    CAPTURE(count);
+    CHECK_THAT(faultOf("<!--" + line + "\n" + line + "--><gizmo/>"),
+               Catch::StartsWith(fmt::format("test.xml:3:{}: ", count + 4)));
+  }
+}
+
+TEST_CASE("scenes: notes are kept once each in their order, also if there are many") {
+  constexpr int kNotes = 200000;
+  Findings findings;
+  const auto start = std::chrono::steady_clock::now();
+  for (int repetition = 0; repetition < 2; ++repetition)
+    for (int i = 0; i < kNotes; ++i) {
+      findings.note(fmt::format("note {:06}", i));
+      findings.noteWithoutEffect(fmt::format("owner {}", i % 2), fmt::format("parameter {:06}", i));
+    }
+  const std::vector<std::string> notes = findings.notes();
+  const std::chrono::duration<double> time = std::chrono::steady_clock::now() - start;
+  CHECK(time.count() < 20);
+  REQUIRE(notes.size() == kNotes + 1);
+  CHECK(notes[0] == "note 000000");
+  CHECK(notes[kNotes - 1] == "note 199999");
+  CHECK_THAT(notes.back(), Catch::Contains(": parameter 000000, parameter 000002, ") &&
+                               Catch::Contains(", parameter 199998 of owner 0; parameter 000001, ") &&
+                               Catch::EndsWith(", parameter 199999 of owner 1"));
 }
 
 TEST_CASE("scenes: integrators set the maximum depth and the visibility of emitters") {
