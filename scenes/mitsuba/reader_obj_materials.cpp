@@ -1,6 +1,7 @@
 #include "scenes/mitsuba/reader_obj_materials.h"
 
 #include <algorithm>
+#include <set>
 #include <stdexcept>
 #include <system_error>
 
@@ -25,13 +26,12 @@ std::vector<std::pair<std::string, int>> ObjMaterialReader::read(pugi::xml_node 
   if (found.library.empty()) return {};
   Place place{shape, location, source.path.parent_path(), {}};
   place.library = resolve(place, found.library);
-  const std::vector<MtlMaterial>& known = library(place);
+  const Library& known = library(place);
+  const std::set<std::string> given(source.obj.materials.begin(), source.obj.materials.end());
   std::vector<std::pair<std::string, int>> result;
   for (const std::string& name : found.names) {
-    if (std::ranges::find(source.obj.materials, name) != source.obj.materials.end()) continue;
-    // If several materials have the same name, the last one is used.
-    const auto material = std::find_if(known.rbegin(), known.rend(), [&](const auto& m) { return m.name == name; });
-    if (material != known.rend()) result.emplace_back(name, use(place, *material));
+    if (given.contains(name)) continue;
+    if (const auto entry = known.find(name); entry != known.end()) result.emplace_back(name, use(place, entry->second));
   }
   return result;
 }
@@ -60,11 +60,12 @@ std::filesystem::path ObjMaterialReader::resolve(const Place& place, std::string
   return context_.file.resolve((place.folder / name).string(), place.location);
 }
 
-const std::vector<MtlMaterial>& ObjMaterialReader::library(const Place& place) {
+const ObjMaterialReader::Library& ObjMaterialReader::library(const Place& place) {
   const auto [entry, isNew] = libraries_.try_emplace(place.library);
   if (!isNew) return entry->second;
   try {
-    entry->second = nameErrors(place.library, [&] { return parseMtl(readFile(place.library)); });
+    for (MtlMaterial& material : nameErrors(place.library, [&] { return parseMtl(readFile(place.library)); }))
+      entry->second[material.name] = std::move(material);
   } catch (const std::runtime_error& error) {
     context_.warn(place.location, fmt::format("material library {}", place.library.string()),
                   fmt::format("{}: material library: {}: diffuse 0.5 is used", describe(place.shape), error.what()));

@@ -37,7 +37,9 @@ class ObjMaterialReader {
   /// Path of a file that the OBJ or its library names: in the folder of the OBJ, or where files of the scene are
   /// searched.
   std::filesystem::path resolve(const Place& place, std::string name) const;
-  const std::vector<MtlMaterial>& library(const Place& place);
+  /// By name. If several materials have the same name, the last one is used.
+  using Library = std::map<std::string, MtlMaterial>;
+  const Library& library(const Place& place);
   int use(const Place& place, const MtlMaterial& material);
   MaterialReader::Made make(const Place& place, const MtlMaterial& material);
   MaterialReader::Made makeModel(const Place& place, const MtlMaterial& material);
@@ -52,7 +54,7 @@ class ObjMaterialReader {
   ReadContext& context_;
   TextureReader& textures_;
   MaterialReader& materials_;
-  std::map<std::filesystem::path, std::vector<MtlMaterial>> libraries_;
+  std::map<std::filesystem::path, Library> libraries_;
   std::map<std::pair<std::filesystem::path, std::string>, int> used_;  // by library and name
 };
 

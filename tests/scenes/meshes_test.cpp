@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 
+#include <chrono>
 #include <cmath>
 #include <numbers>
 
@@ -94,6 +95,27 @@ TEST_CASE("scenes: the library of an OBJ is ignored where the scene gives materi
   CHECK(files.read("<boolean name=\"loadMaterials\" value=\"false\"/>").shapes.size() == 1);
   CHECK(files.read("", "3.0.0").shapes.size() == 1);
   CHECK(files.read("<boolean name=\"load_materials\" value=\"true\"/>", "3.0.0").shapes.size() == 3);
+}
+
+TEST_CASE("scenes: the last material of a name in a library is used") {
+  const Scene scene = ObjScene(kRedAndGreen + "newmtl red\nKd 0 0 1\n").read();
+  CHECK(isNear(albedoOf(scene, 0), Rgb(0, 0, 1)));
+}
+
+TEST_CASE("scenes: many materials are looked up in a large library in less than quadratic time") {
+  std::string library, obj = "mtllib colours.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n";
+  for (int i = 0; i < 100000; ++i) {
+    library += fmt::format("newmtl known {}\n", i);
+    obj += fmt::format("usemtl other {}\nf 1 2 3\n", i);
+  }
+  const ObjScene files(library, obj + "usemtl known 0\nf 1 2 3\n");
+  const auto start = std::chrono::steady_clock::now();
+  const Scene scene = files.read();
+  const std::chrono::duration<double> time = std::chrono::steady_clock::now() - start;
+  CHECK(time.count() < 20);
+  REQUIRE(scene.shapes.size() == 2);
+  CHECK(scene.shapes[0].name == "a.obj:known 0");
+  CHECK(std::get<TriangleMesh>(scene.shapes[1].geometry).triangles.size() == 100000);
 }
 
 TEST_CASE("scenes: shape_index selects a mesh of an OBJ") {
