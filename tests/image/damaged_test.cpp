@@ -1,0 +1,94 @@
+// Image files with damaged or false headers.
+
+#include <cstdint>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <zlib.h>
+#include <catch2/catch.hpp>
+
+#define STB_IMAGE_WRITE_IMPLEMENTATION
+#define STB_IMAGE_WRITE_STATIC
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-function"
+#include <stb/stb_image_write.h>
+#pragma GCC diagnostic pop
+
+#include "runtime/image/image_output.h"
+#include "tests/support/tool_run.h"
+
+using namespace lobe;
+using Catch::Contains;
+
+namespace {
+
+void putBigEndian(std::string& bytes, std::size_t at, std::uint32_t value) {
+  for (int shift = 24; shift >= 0; shift -= 8) bytes[at++] = static_cast<char>(value >> shift & 0xff);
+}
+
+/// A small PNG whose header gives this size, with a correct checksum.
+std::string pngThatClaims(std::uint32_t width, std::uint32_t height) {
+  const test::Folder folder;
+  writeImage(folder / "a.png", Image(3, 2));
+  std::string bytes = test::readFile(folder / "a.png");
+  // After the signature of 8 bytes, the chunk IHDR: length, name, width, height and 5 more bytes, checksum.
+  constexpr std::size_t kName = 12, kWidth = 16, kHeight = 20, kChecksum = 29;
+  REQUIRE(bytes.substr(kName, 4) == "IHDR");
+  putBigEndian(bytes, kWidth, width);
+  putBigEndian(bytes, kHeight, height);
+  const uLong checksum = crc32(0, reinterpret_cast<const Bytef*>(&bytes[kName]), kChecksum - kName);
+  putBigEndian(bytes, kChecksum, static_cast<std::uint32_t>(checksum));
+  return bytes;
+}
+
+std::string jpegOfNoise(int width, int height) {
+  const test::Folder folder;
+  std::vector<std::uint8_t> noise(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 3);
+  for (std::size_t i = 0; i < noise.size(); ++i) noise[i] = static_cast<std::uint8_t>(i * i / 7);
+  REQUIRE(stbi_write_jpg((folder / "a.jpg").c_str(), width, height, 3, noise.data(), 90));
+  return test::readFile(folder / "a.jpg");
+}
+
+Image readBytes(const std::string& name, const std::string& bytes) {
+  const test::Folder folder;
+  std::ofstream(folder / name, std::ios::binary) << bytes;
+  return readImage(folder / name);
+}
+
+}  // namespace
+
+TEST_CASE("render: a small PNG that claims a large size is rejected") {
+  CHECK(readBytes("a.png", pngThatClaims(3, 2)).width == 3);
+  CHECK_THROWS_WITH(readBytes("a.png", pngThatClaims(10000, 10000)),
+                    Contains("a.png: a file of") && Contains("cannot contain 10000x10000 pixels"));
+  CHECK_THROWS_WITH(readBytes("a.png", pngThatClaims(16000, 16000)),
+                    Contains("a.png: its size of 16000x16000 pixels is outside the supported range"));
+  CHECK_THROWS_WITH(readBytes("a.png", pngThatClaims(0xffffffff, 0xffffffff)), Contains("a.png: "));
+}
+
+TEST_CASE("render: a JPEG with damaged Huffman tables is rejected or read, but never crashes") {
+  const std::string bytes = jpegOfNoise(17, 13);
+  CHECK(readBytes("a.jpg", bytes).height == 13);
+  const std::size_t marker = bytes.find("\xff\xc4");
+  REQUIRE(marker != std::string::npos);
+  // After the marker and the length of the segment: the number of the first table, and how many codes it has of each of
+  // 16 lengths.
+  constexpr std::size_t kLengths = 16;
+  const std::size_t table = marker + 4;
+  std::string full = bytes;
+  full.replace(table + 1, kLengths, kLengths, '\xff');
+  CHECK_THROWS_WITH(readBytes("a.jpg", full), Contains("a.jpg: damaged image"));
+  const std::size_t length =
+      static_cast<std::uint8_t>(bytes[marker + 2]) * 256u + static_cast<std::uint8_t>(bytes[marker + 3]);
+  for (std::size_t i = marker + 2; i < marker + 2 + length; ++i) {
+    std::string damaged = bytes;
+    damaged[i] = '\xff';
+    CAPTURE(i);
+    try {
+      CHECK(readBytes("a.jpg", damaged).width == 17);
+    } catch (const std::runtime_error& error) {
+      CHECK_THAT(error.what(), Contains("a.jpg: ") && !Contains("\n"));
+    }
+  }
+}
