@@ -261,3 +261,24 @@ TEST_CASE("training: the weight window is unbiased for particles of any weight")
   CHECK(kept.mean() > 1.5);
   CHECK(deviation(kept, ended) < kMaxDeviation);
 }
+
+TEST_CASE("training: photons that gain light at every bounce need bounded memory and lose no light") {
+  const float albedo = 1.5f, intensity = 3;
+  Scene scene;
+  addShape(scene, box({-2, -2, -2}, {2, 2, 2}, true), addMaterial(scene, std::make_shared<Diffuse>(albedo)));
+  scene.lights.push_back(PointLight{{0, 0, 0}, grey(intensity)});
+  const RenderScene ready(scene);
+  const Unguided unguided(scene);
+  const RayCamera camera = roomCamera();
+  const ParticleTracer tracer(ready, camera, unguided.sampler, unguided.sampler, nullptr, 1);
+  const int photons = 1000;
+  const PhotonResult result = tracer.tracePhotons(0, photons);
+  const std::vector<Particle>& particles = dataOf(result.radiance).photons;
+  CHECK(std::ssize(particles) < 128 * photons);
+  // All light is reflected until the longest paths end. Its direct part is not stored.
+  double flux = 0, expected = 0;
+  for (const Particle& p : particles) flux += p.weight / photons;
+  for (int bounces = 1; bounces < kMaxTrainingDepth; ++bounces)
+    expected += 4 * kPi * intensity * std::pow(albedo, bounces);
+  CHECK(flux == Approx(expected).epsilon(0.01));
+}

@@ -14,6 +14,10 @@ constexpr int kMaxWaiting = 64;  // branches of one photon in the queue
 // Branches of one photon in total. Surfaces that reflect more light than they receive would otherwise split it
 // endlessly.
 constexpr int kMaxBranchesOfPhoton = 512;
+// Segments of all photons of a result, 64 for each photon of a chunk of ParticleTracer, after which none of them is
+// split. In a closed room of reflectance 1.5, where every photon would be split, a pass of 300,000 photons then stores
+// 30 million particles (1.4 GB) instead of 280 million.
+constexpr std::uint64_t kMaxSegmentsWithSplitting = 64 * 256;
 
 }  // namespace
 
@@ -34,6 +38,7 @@ void PhotonWalk::run(const EmittedPhoton& photon, std::uint64_t index, int photo
 
 // Traces one segment, stores the photon at its end point, and scatters the branches that leave from there.
 void PhotonWalk::advance(const EmittedPhoton& photon, const Branch& branch) {
+  ++result_.segments;
   const std::optional<SurfaceHit> hit = scene_.tracer.trace(branch.state.ray);
   if (!hit || !hit->bsdf || !sidesAgree(*hit, hit->woWorld, hit->wo)) return;
   if (hit->bsdf->deltaProbability(hit->wo, hit->uv) >= 1) return branchOff(branch, *hit, nullptr);
@@ -113,11 +118,17 @@ int PhotonWalk::applyWeightWindow(Rgb& weight) {
     return rng_.uniform() * kLowestWeight < relative ? 1 : 0;
   }
   if (relative <= kHighestWeight) return 1;
-  const int room = std::max(1, std::min(kMaxWaiting - static_cast<int>(waiting_.size()), kMaxBranchesOfPhoton - made_));
-  const int branches = std::min(static_cast<int>(std::min(relative / 2, 1e3f)) + 1, room);
+  const int branches = std::min(static_cast<int>(std::min(relative / 2, 1e3f)) + 1, mostBranches());
   made_ += branches;
   weight /= static_cast<float>(branches);
   return branches;
+}
+
+// Number of branches into which a particle may be split, at least 1. It depends only on what was traced before, so that
+// estimates are unbiased: a particle that is not split keeps its weight.
+int PhotonWalk::mostBranches() const {
+  if (result_.segments >= kMaxSegmentsWithSplitting) return 1;
+  return std::max(1, std::min(kMaxWaiting - static_cast<int>(waiting_.size()), kMaxBranchesOfPhoton - made_));
 }
 
 }  // namespace lobe

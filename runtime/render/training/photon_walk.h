@@ -10,9 +10,11 @@
 
 namespace lobe {
 
+/// The result of some photons that are traced one after another.
 struct PhotonResult {
-  SampleStorage radiance;    ///< every arrival at a surface that is not purely specular
-  SampleStorage importance;  ///< requests for importance records where there are none
+  SampleStorage radiance;      ///< every arrival at a surface that is not purely specular
+  SampleStorage importance;    ///< requests for importance records where there are none
+  std::uint64_t segments = 0;  ///< traced so far; bounds the splitting of photons
 };
 
 class PhotonWalk {
@@ -39,6 +41,7 @@ class PhotonWalk {
   void branchOff(Branch branch, const SurfaceHit& hit, const GuidedSampler::Vertex* vertex);
   void store(const EmittedPhoton& photon, const Branch& branch, const SurfaceHit& hit);
   int applyWeightWindow(Rgb& weight);
+  int mostBranches() const;
 
   const RenderScene& scene_;
   const GuidedSampler& importance_;
