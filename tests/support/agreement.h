@@ -34,23 +34,41 @@ inline std::vector<Block> blocks(const Film& film, int size) {
   return all;
 }
 
-/// Whether neither any block differs significantly (level 0.1 % with Šidák's correction for the number of blocks) nor
-/// the sum of all blocks. Blocks without variance must be equal.
-inline bool agree(const std::vector<Block>& a, const std::vector<Block>& b) {
-  double worst = 0, sumA = 0, sumB = 0, variance = 0;
+struct ZTest {
+  double worst = 0;  ///< largest difference of a block, in standard deviations
+  double p = 1;      ///< probability of such a difference in any of the blocks (Šidák's correction for their number)
+  double together = 0;  ///< difference of the sums of all blocks, in standard deviations
+  double ratio = 1;     ///< of the sums
+
+  /// Whether neither any block differs significantly (level 0.1 %) nor the sum of all blocks.
+  bool passes() const { return p > 0.001 && together < 3.3; }
+};
+
+/// Compares blocks of equal order. Blocks without variance must be equal.
+inline ZTest zTest(const std::vector<Block>& a, const std::vector<Block>& b) {
+  ZTest test;
+  double sumA = 0, sumB = 0, variance = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
     const double v = a[i].variance + b[i].variance;
     const double difference = std::abs(a[i].mean - b[i].mean);
-    if (difference > 0) worst = std::max(worst, difference / std::sqrt(v));
+    if (difference > 0) test.worst = std::max(test.worst, difference / std::sqrt(v));
     sumA += a[i].mean;
     sumB += b[i].mean;
     variance += v;
   }
-  const double together = sumA == sumB ? 0 : std::abs(sumA - sumB) / std::sqrt(variance);
-  const double chance = std::erfc(worst / std::sqrt(2.0));  // of one block, two-sided
-  const double level = 1 - std::pow(1 - 0.001, 1.0 / static_cast<double>(a.size()));
-  UNSCOPED_INFO("worst " << worst << ", together " << together << ", ratio " << sumA / sumB);
-  return chance > level && together < 3.3;
+  test.together = sumA == sumB ? 0 : std::abs(sumA - sumB) / std::sqrt(variance);
+  test.ratio = sumA / sumB;
+  const double chance = std::erfc(test.worst / std::sqrt(2.0));  // of one block, two-sided
+  test.p = -std::expm1(static_cast<double>(a.size()) * std::log1p(-chance));
+  return test;
+}
+
+/// Whether a z-test passes.
+inline bool agree(const std::vector<Block>& a, const std::vector<Block>& b) {
+  const ZTest test = zTest(a, b);
+  UNSCOPED_INFO("worst " << test.worst << " (p " << test.p << "), together " << test.together << ", ratio "
+                         << test.ratio);
+  return test.passes();
 }
 
 }  // namespace lobe::test

@@ -70,6 +70,19 @@ void checkAgreement(const Studio& studio) {
 
 }  // namespace
 
+TEST_CASE("unbiased: the p-value of the worst block takes the number of blocks into account") {
+  const std::vector<Block> equal(10, Block{1, 0.5});
+  std::vector<Block> others = equal;
+  others[3].mean = 4;
+  const lobe::test::ZTest test = lobe::test::zTest(equal, others);
+  CHECK(test.worst == Approx(3));
+  CHECK(test.p == Approx(0.02667).epsilon(0.001));
+  CHECK(lobe::test::zTest(equal, equal).p == 1);
+  others[3].mean = 7;
+  CHECK(agree(equal, equal));
+  CHECK_FALSE(agree(equal, others));
+}
+
 TEST_CASE("unbiased: all integrators agree on the demo scene", "[slow]") {
   const Studio studio(readScene(std::string(LOBE_SOURCE_DIR) + "/scenes/jewelry.xml"), 60, 40);
   REQUIRE(studio.illumination().records().size() > 100);
