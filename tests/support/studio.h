@@ -67,6 +67,8 @@ class Studio {
   const GuidedSampler& guidedSampler() const { return *guided_; }
   const GuidedSampler& productSampler() const { return *product_; }
   const GuidedSampler& importanceSampler() const { return *importanceSampler_; }
+  const SampleCountModel& guidedCounts() const { return *guidedCounts_; }
+  const SampleCountModel& productCounts() const { return *productCounts_; }
   const IlluminationCache& illumination() const { return cacheOf(illumination_); }
   const Field& importance() const { return importance_; }
   std::filesystem::path lobes() const { return folder_ / "lobes"; }
