@@ -2,7 +2,10 @@
 // Creates PNG files with a few pixels byte by byte.
 
 #include <cstdint>
+#include <stdexcept>
 #include <string>
+
+#include <zlib.h>
 
 namespace lobe {
 
@@ -12,20 +15,47 @@ inline std::string bigEndian(std::uint32_t value) {
   return bytes;
 }
 
-/// The checksum is invalid, because our reader ignores it.
+inline const Bytef* zlibBytes(const std::string& bytes) {
+  return reinterpret_cast<const Bytef*>(bytes.data());
+}
+
 inline std::string chunk(const std::string& name, const std::string& data) {
-  return bigEndian(static_cast<std::uint32_t>(data.size())) + name + data + "none";
+  const std::string content = name + data;
+  const uLong checksum = crc32(0, zlibBytes(content), static_cast<uInt>(content.size()));
+  return bigEndian(static_cast<std::uint32_t>(data.size())) + content + bigEndian(static_cast<std::uint32_t>(checksum));
+}
+
+inline std::string deflated(const std::string& data) {
+  uLongf size = compressBound(data.size());
+  std::string bytes(size, '\0');
+  if (compress(reinterpret_cast<Bytef*>(bytes.data()), &size, zlibBytes(data), data.size()) != Z_OK)
+    throw std::runtime_error("zlib cannot compress the rows of the image");
+  bytes.resize(size);
+  return bytes;
+}
+
+enum class PngColours : char { grey = 0, rgb = 2, palette = 3, greyAlpha = 4, rgba = 6 };
+
+struct PngFormat {
+  std::uint32_t width, height;
+  int depth;
+  PngColours colours;
+  bool interlaced = false;
+};
+
+/// stream: the deflated rows, each after the number of its filter (0: none). chunks: those between header and pixels.
+inline std::string pngFile(const PngFormat& format, const std::string& stream, const std::string& chunks = "") {
+  const std::string kind{static_cast<char>(format.depth), static_cast<char>(format.colours), '\0', '\0',
+                         static_cast<char>(format.interlaced)};
+  return "\x89PNG\r\n\x1a\n" + chunk("IHDR", bigEndian(format.width) + bigEndian(format.height) + kind) + chunks +
+         chunk("IDAT", stream) + chunk("IEND", "");
 }
 
 /// One row of 8-bit pixels of three or four components.
 inline std::string rowPng(const std::string& components, int perPixel, const std::string& chunks = "") {
-  const std::string row = '\0' + components;  // no filter
-  const auto low = static_cast<char>(row.size()), notLow = static_cast<char>(~row.size());
-  const std::string stored = std::string("\x78\x01\x01", 3) + low + '\0' + notLow + '\xff' + row + "none";
-  const std::string kind{'\x8', perPixel == 4 ? '\x6' : '\x2', '\0', '\0', '\0'};
   const auto width = static_cast<std::uint32_t>(components.size() / static_cast<std::size_t>(perPixel));
-  return "\x89PNG\r\n\x1a\n" + chunk("IHDR", bigEndian(width) + bigEndian(1) + kind) + chunks + chunk("IDAT", stored) +
-         chunk("IEND", "");
+  const PngColours colours = perPixel == 4 ? PngColours::rgba : PngColours::rgb;
+  return pngFile({width, 1, 8, colours}, deflated('\0' + components), chunks);
 }
 
 }  // namespace lobe
