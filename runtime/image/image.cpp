@@ -17,6 +17,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string_view>
+#include <variant>
 
 #include <fmt/format.h>
 
@@ -24,6 +25,7 @@
 #include "runtime/core/files.h"
 #include "runtime/core/fingerprint.h"
 #include "runtime/image/jpeg_file.h"
+#include "runtime/image/png_file.h"
 #include "runtime/image/rgbe_file.h"
 
 // Static functions, so that another copy of stb_image in the program does not clash.
@@ -34,6 +36,7 @@
 #define STBI_NO_JPEG
 #define STBI_NO_LINEAR
 #define STBI_NO_PIC
+#define STBI_NO_PNG
 #define STBI_NO_PNM
 #define STBI_NO_PSD
 #pragma GCC diagnostic push
@@ -178,8 +181,7 @@ std::optional<Image> readExr(const std::filesystem::path& path, const NamesOf& n
 struct FreePixels {
   void operator()(void* pixels) const { stbi_image_free(pixels); }
 };
-template <class T>
-using Pixels = std::unique_ptr<T, FreePixels>;
+using Pixels = std::unique_ptr<stbi_uc, FreePixels>;
 
 /// Callbacks through which stb_image reads the file. They detect reads past its end, because stb_image accepts
 /// truncated TGA files.
@@ -232,17 +234,20 @@ Image decodeAlpha(const T* codes, int width, int height) {
   return image;
 }
 
-/// Loads an image with one of stb_image's loaders.
-template <class T, class Load>
-Image loadPixels(const std::filesystem::path& path, std::string_view bytes, const Encoding& encoding, Part part,
-                 Load load) {
+/// The requested part of an image in an integer format.
+template <class T>
+Image decodePart(const T* codes, int width, int height, const Encoding& encoding, Part part) {
+  return part == Part::alpha ? decodeAlpha(codes, width, height) : decodeColours(codes, width, height, encoding);
+}
+
+/// Loads an image with stb_image.
+Image loadPixels(const std::filesystem::path& path, std::string_view bytes, const Encoding& encoding, Part part) {
   Source source{bytes};
   int width = 0, height = 0, channels = 0;
-  const Pixels<T> pixels(load(&kSourceCallbacks, &source, &width, &height, &channels, kComponents));
+  const Pixels pixels(stbi_load_from_callbacks(&kSourceCallbacks, &source, &width, &height, &channels, kComponents));
   if (source.exhausted) fail(path, "damaged image (it ends too early)");
   if (!pixels) fail(path, fmt::format("damaged image ({})", stbi_failure_reason()));
-  return part == Part::alpha ? decodeAlpha<T>(pixels.get(), width, height)
-                             : decodeColours<T>(pixels.get(), width, height, encoding);
+  return decodePart(pixels.get(), width, height, encoding, part);
 }
 
 Image readHdr(const std::filesystem::path& path, std::string_view bytes, Part part) {
@@ -252,36 +257,22 @@ Image readHdr(const std::filesystem::path& path, std::string_view bytes, Part pa
   return nameErrors(path, [&] { return readRgbe(bytes); });
 }
 
-std::uint32_t bigEndian(std::string_view bytes) {
-  std::uint32_t value = 0;
-  for (const char byte : bytes.substr(0, 4)) value = value << 8 | static_cast<std::uint8_t>(byte);
-  return value;
-}
-
-/// The exponent given by a PNG's gAMA chunk; nullopt without such a chunk, or with an sRGB chunk, which takes
-/// precedence.
-std::optional<float> gammaOfPng(std::string_view bytes) {
-  constexpr std::string_view kSignature = "\x89PNG\r\n\x1a\n";
-  constexpr std::size_t kAround = 12;  // bytes around the data of a chunk: length, name and checksum
-  std::optional<float> gamma;
-  bytes.remove_prefix(bytes.starts_with(kSignature) ? kSignature.size() : bytes.size());
-  while (bytes.size() >= kAround) {
-    const std::size_t length = bigEndian(bytes);
-    const std::string_view name = bytes.substr(4, 4);
-    if (name == "IDAT" || length > bytes.size() - kAround) break;
-    if (name == "sRGB") return std::nullopt;
-    if (name == "gAMA" && length == 4)
-      if (const std::uint32_t value = bigEndian(bytes.substr(8)); value > 0) gamma = 1e5f / static_cast<float>(value);
-    bytes.remove_prefix(kAround + length);
-  }
-  return gamma;
-}
-
-/// Replaces a tagged encoding by the one that the file specifies.
+/// Replaces a tagged encoding by the one that a PNG specifies.
 Encoding resolved(const Encoding& encoding, std::string_view bytes) {
   if (encoding.kind != Encoding::Kind::tagged) return encoding;
   const std::optional<float> gamma = gammaOfPng(bytes);
   return gamma ? Encoding{Encoding::Kind::gamma, *gamma} : encoding;
+}
+
+Image readPngImage(const std::filesystem::path& path, std::string_view bytes, const Encoding& encoding, Part part) {
+  const PngHeader header = nameErrors(path, [&] { return headerOfPng(bytes); });
+  checkExpansion(path, header.width, header.height, bytes.size(), kMostPerByte);
+  if (part == Part::alpha && !header.hasAlpha) failWithoutAlpha(path);
+  const PngCodes pixels = nameErrors(path, [&] { return readPng(bytes); });
+  const auto decodeCodes = [&](const auto& codes) {
+    return decodePart(codes.data(), header.width, header.height, resolved(encoding, bytes), part);
+  };
+  return std::visit(decodeCodes, pixels);
 }
 
 Image readJpegImage(const std::filesystem::path& path, std::string_view bytes, const Encoding& encoding, Part part) {
@@ -297,6 +288,7 @@ Image readOther(const std::filesystem::path& path, const Encoding& encoding, Par
   if (bytes.size() > static_cast<std::size_t>(std::numeric_limits<int>::max()))
     fail(path, "files over 2 GiB are not supported");
   if (startsLikeRgbe(bytes)) return readHdr(path, bytes, part);
+  if (startsLikePng(bytes)) return readPngImage(path, bytes, encoding, part);
   if (startsLikeJpeg(bytes)) return readJpegImage(path, bytes, encoding, part);
   const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
   const int length = static_cast<int>(bytes.size());
@@ -306,9 +298,7 @@ Image readOther(const std::filesystem::path& path, const Encoding& encoding, Par
                            stbi_failure_reason()));
   checkExpansion(path, width, height, bytes.size(), kMostPerByte);
   if (part == Part::alpha && channels != 2 && channels != 4) failWithoutAlpha(path);
-  if (stbi_is_16_bit_from_memory(data, length))
-    return loadPixels<stbi_us>(path, bytes, resolved(encoding, bytes), part, stbi_load_16_from_callbacks);
-  return loadPixels<stbi_uc>(path, bytes, resolved(encoding, bytes), part, stbi_load_from_callbacks);
+  return loadPixels(path, bytes, encoding, part);
 }
 
 bool startsLikeExr(const std::filesystem::path& path) {

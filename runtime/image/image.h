@@ -36,9 +36,10 @@ struct Encoding {
   float exponent = 1.0f;
 };
 
-/// Reads PNG, JPEG, BMP, TGA (stb_image), HDR (rgbe_file.h) and EXR (OpenEXR; R, G, B or a single luminance channel Y).
-/// The image of an EXR file is the display window, black outside the data window. Floating-point data are linear
-/// whatever the encoding. Alpha is discarded. Throws std::runtime_error that names the file and the fault.
+/// Reads PNG (png_file.h), JPEG (jpeg_file.h), BMP, TGA (stb_image), HDR (rgbe_file.h) and EXR (OpenEXR; R, G, B or a
+/// single luminance channel Y). The image of an EXR file is the display window, black outside the data window.
+/// Floating-point data are linear whatever the encoding. Alpha is discarded. Throws std::runtime_error that names the
+/// file and the fault.
 Image readImage(const std::filesystem::path& path, Encoding encoding = {});
 
 /// The alpha channel of a file as a grey image: linear, scaled to [0, 1] for integer formats. Throws std::runtime_error
