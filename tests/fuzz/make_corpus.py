@@ -130,6 +130,20 @@ def exr_files():
     return files
 
 
+def png(depth, colours, interlaced, rows, chunks=()):
+    """rows: each begins with the number of its filter; chunks: pairs of name and data, between header and pixels."""
+    header = struct.pack(">IIBBBBB", 3, 3, depth, colours, 0, 0, interlaced)
+    listed = [(b"IHDR", header), *chunks, (b"IDAT", zlib.compress(rows)), (b"IEND", b"")]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+                                            for name, data in listed)
+
+
+def png_files():
+    palette = [(b"PLTE", bytes(range(9))), (b"tRNS", b"\x40")]
+    return {"palette": png(2, 3, 0, b"\0\x18\2\x20\4\x44", palette),
+            "16-bit-interlaced": png(16, 4, 1, b"".join(b"\0" + bytes(range(4 * n)) for n in (1, 1, 2, 1, 1, 3)))}
+
+
 def tga():
     return bytes([0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0]) + struct.pack("<HH", 2, 2) + bytes([24, 0]) + bytes(range(12))
 
@@ -172,9 +186,10 @@ def main():
     for target, content in inline.items():
         (corpus / target).mkdir(parents=True, exist_ok=True)
         (corpus / target / "initial").write_bytes(content)
-    (corpus / "exr").mkdir(exist_ok=True)
-    for name, content in exr_files().items():
-        (corpus / "exr" / f"initial-{name}").write_bytes(content)
+    for target, files in {"exr": exr_files(), "png": png_files()}.items():
+        (corpus / target).mkdir(exist_ok=True)
+        for name, content in files.items():
+            (corpus / target / f"initial-{name}").write_bytes(content)
     with tempfile.TemporaryDirectory() as folder:
         for target, files in made_by_tools(tools, pathlib.Path(folder)).items():
             (corpus / target).mkdir(parents=True, exist_ok=True)
