@@ -1,6 +1,7 @@
 #include "runtime/core/atomic_file.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -56,6 +57,7 @@ class Temporary {
       file_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     } while (file_ < 0 && errno == EEXIST);
     if (file_ < 0) refuse(path_, errno);
+    keepPermissions();
   }
   Temporary(const Temporary&) = delete;
   Temporary& operator=(const Temporary&) = delete;
@@ -89,6 +91,12 @@ class Temporary {
     constexpr std::size_t kMaxLength = 255;
     const std::string unique = fmt::format(".{}-{}", ::getpid(), number);
     return fmt::format(".{}{}", target.filename().string().substr(0, kMaxLength - 1 - unique.size()), unique);
+  }
+
+  /// Gives the file the permissions of the file that it replaces, if there is one.
+  void keepPermissions() {
+    struct stat status;
+    if (::stat(target_.c_str(), &status) == 0 && ::fchmod(file_, status.st_mode & 07777) != 0) refuse(path_, errno);
   }
 
   int close() { return file_ < 0 ? 0 : ::close(std::exchange(file_, -1)); }

@@ -142,10 +142,13 @@ auto measured(const std::string& name, const Measure& measure) {
   }
 }
 
-Comparison compare(const lobe::Image& reference, const std::string& name, const std::string& map) {
+/// A map that cannot be written is added to the errors.
+Comparison compare(const lobe::Image& reference, const std::string& name, const std::string& map,
+                   lobe::OutputErrors& errors) {
   const lobe::Image image = lobe::readImage(name);
   Comparison result{name, measured(name, [&] { return lobe::compareImages(reference, image); })};
-  if (!map.empty()) lobe::writeErrorMap(map, image.width, lobe::relativeErrors(reference, image));
+  if (!map.empty())
+    errors.attempt(map, [&] { lobe::writeErrorMap(map, image.width, lobe::relativeErrors(reference, image)); });
   return result;
 }
 
@@ -216,8 +219,8 @@ void comparePair(const Arguments& arguments) {
   const lobe::Image a = lobe::readImage(arguments.reference), b = lobe::readImage(name);
   lobe::checkDifferentSeeds(arguments.reference, name);
   const lobe::PairVariance variance = measured(name, [&] { return lobe::comparePair(a, b); });
-  if (!arguments.map.empty()) lobe::writeErrorMap(arguments.map, a.width, lobe::relativeVariances(a, b));
   arguments.json ? printJson(variance, arguments) : printTable(variance, arguments);
+  if (!arguments.map.empty()) lobe::writeErrorMap(arguments.map, a.width, lobe::relativeVariances(a, b));
 }
 
 // ---- Agreement of two methods
@@ -266,11 +269,16 @@ lobe::Image readReference(const Arguments& arguments) {
 
 void merge(const Arguments& arguments) {
   const lobe::MergedImage merged = lobe::mergeImages(all(arguments));
+  lobe::OutputErrors errors;
   if (!arguments.variance.empty())
-    lobe::writeImage(arguments.variance, lobe::varianceOfMerged(all(arguments), merged.image));
-  const std::size_t clamped =
-      lobe::writeImage(arguments.merge, merged.image, merged.attributes, lobe::layersOf(merged.aovs), arguments.exr);
-  lobe::noteClamped("lobecompare", arguments.merge, clamped);
+    errors.attempt(arguments.variance,
+                   [&] { lobe::writeImage(arguments.variance, lobe::varianceOfMerged(all(arguments), merged.image)); });
+  errors.attempt(arguments.merge, [&] {
+    const std::size_t clamped =
+        lobe::writeImage(arguments.merge, merged.image, merged.attributes, lobe::layersOf(merged.aovs), arguments.exr);
+    lobe::noteClamped("lobecompare", arguments.merge, clamped);
+  });
+  errors.throwIfAny();
 }
 
 void convert(const Arguments& arguments) {
@@ -287,11 +295,14 @@ void run(const Arguments& arguments) {
   if (!arguments.others.empty()) return testAgreement(arguments);
   const lobe::Image reference = readReference(arguments);
   std::vector<Comparison> comparisons;
-  for (const std::string& name : arguments.images) comparisons.push_back(compare(reference, name, arguments.map));
+  lobe::OutputErrors errors;
+  for (const std::string& name : arguments.images)
+    comparisons.push_back(compare(reference, name, arguments.map, errors));
   if (arguments.json)
     printJson(comparisons);
   else
     printTable(comparisons);
+  errors.throwIfAny();
 }
 
 }  // namespace

@@ -1,8 +1,10 @@
 // loberender: trains the illumination of a scene and renders it.
 
 #include <algorithm>
+#include <charconv>
 #include <cstdint>
 #include <sstream>
+#include <system_error>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -37,12 +39,14 @@ std::set<Aov> parseAovs(const std::string& text) {
 
 /// Parses two numbers separated by `sign`; `form` describes the format in the error message.
 std::pair<int, int> parsePair(const std::string& option, const std::string& text, char sign, const char* form) {
-  int first = 0, second = 0, end = 0;
-  char between = 0;
-  if (std::sscanf(text.c_str(), "%d%c%d%n", &first, &between, &second, &end) != 3 || between != sign ||
-      end != static_cast<int>(text.size()))
-    throw UsageError(option + ": '" + text + "' is not " + form);
-  return {first, second};
+  const char* const end = text.data() + text.size();
+  int first = 0, second = 0;
+  const auto [between, error] = std::from_chars(text.data(), end, first);
+  if (error == std::errc() && between != end && *between == sign) {
+    const auto [rest, errorOfSecond] = std::from_chars(between + 1, end, second);
+    if (errorOfSecond == std::errc() && rest == end) return {first, second};
+  }
+  throw UsageError(option + ": '" + text + "' is not " + form);
 }
 
 constexpr std::uint64_t kMaxSeed = std::uint64_t{1} << 53;  // the metadata of a picture stores it exactly

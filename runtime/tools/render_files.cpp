@@ -1,7 +1,7 @@
 #include "runtime/tools/render_files.h"
 
 #include <map>
-#include <new>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -46,16 +46,6 @@ void checkSceneFiles(const RenderJob& job, const Scene& scene) {
     for (const LobeRequest& request : lobeRequests(scene))
       read.push_back(job.cacheFolder / lobeFileName(request.model, request.key));
   for (const auto& path : writtenBy(job)) checkNotRead(path, read);
-}
-
-void OutputErrors::attempt(const std::filesystem::path& path, const std::function<void()>& write) {
-  try {
-    write();
-  } catch (const std::bad_alloc&) {
-    errors_.push_back(path.string() + ": not enough memory");
-  } catch (const std::exception& e) {
-    errors_.emplace_back(e.what());
-  }
 }
 
 }  // namespace lobe

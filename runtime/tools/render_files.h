@@ -2,10 +2,6 @@
 // The files that a run of loberender reads and writes.
 
 #include <filesystem>
-#include <functional>
-#include <string>
-#include <vector>
-
 #include "runtime/tools/render_job.h"
 #include "scenes/scene.h"
 
@@ -17,16 +13,5 @@ void checkFiles(const RenderJob& job);
 
 /// Throws UsageError if an output would replace a file of the scene or a BRDF cache.
 void checkSceneFiles(const RenderJob& job, const Scene& scene);
-
-/// Collects the errors of outputs, so that one that fails does not prevent the others.
-class OutputErrors {
- public:
-  /// Calls `write`; if it throws, its message is added to the errors.
-  void attempt(const std::filesystem::path& path, const std::function<void()>& write);
-  const std::vector<std::string>& all() const { return errors_; }
-
- private:
-  std::vector<std::string> errors_;
-};
 
 }  // namespace lobe

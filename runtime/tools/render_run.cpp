@@ -80,12 +80,14 @@ bool isFeature(Aov aov) {
 }
 
 /// Draws the record of --record. If no record serves the surface, prints a warning and the run continues.
-void drawRecord(const RenderJob& job, const RenderScene& scene, const Receiver& receiver,
-                TrainedIllumination& training) {
+void drawRecord(const RenderJob& job, const RenderScene& scene, const Receiver& receiver, TrainedIllumination& training,
+                OutputErrors& errors) {
   try {
     const RecordView view = viewRecord(scene, receiver, training, job.training.records);
-    view.raster.write(job.recordImage);
-    printNote(kTool, fmt::format("{}: {}", job.recordImage.string(), view.caption));
+    errors.attempt(job.recordImage, [&] {
+      view.raster.write(job.recordImage);
+      printNote(kTool, fmt::format("{}: {}", job.recordImage.string(), view.caption));
+    });
   } catch (const NoRecord& e) {
     printWarning(kTool, recordFault(job, e));
   }
@@ -105,6 +107,8 @@ class Run {
   void render();
   /// Writes the outputs, and throws if one of them cannot be written, or if the run was stopped.
   void finish();
+  /// Writes the outputs as they are after render() has failed.
+  void rescue();
 
  private:
   void readCheckpoint();
@@ -117,6 +121,7 @@ class Run {
   bool snapshotIsDue() const;
   void snapshot();
   void writeOutputs(OutputErrors& errors) const;
+  void writePicture(const std::filesystem::path& output, const RunResult& result) const;
   void writeCheckpoint(OutputErrors& errors) const;
   std::string stopMessage() const;
   double prepared() const { return guiding_.seconds(); }
@@ -142,6 +147,7 @@ class Run {
   std::optional<GradientFilm> gradients_;  // replaces film_ with --gradients
   std::optional<FeatureFilm> features_;    // for --aov
   RenderResult result_;
+  std::uint64_t sceneHash_ = 0;  // for the metadata of the picture
   OutputErrors errors_;
   Stopwatch sinceSnapshot_;
 };
@@ -153,6 +159,7 @@ void Run::prepare() {
   const Stopwatch reading;
   scene_.emplace(readFor(job_));
   load_.reading = reading.seconds();
+  sceneHash_ = pictureHash(*scene_);
   checkSceneFiles(job_, *scene_);
   log_.emplace(job_, *scene_);
   if (job_.mayUseProduct())
@@ -179,7 +186,7 @@ void Run::prepare() {
   if (std::ranges::any_of(job_.aovs, isFeature)) features_.emplace(camera_->width(), camera_->height());
   const std::optional<Receiver> receiver = receiverFor(job_, *renderScene_, *camera_);
   if (job_.guided()) makeGuiding();
-  if (receiver) drawRecord(job_, *renderScene_, *receiver, guiding_.training);
+  if (receiver) drawRecord(job_, *renderScene_, *receiver, guiding_.training, errors_);
   integrator_ = makeIntegrator(job_, *renderScene_, *camera_, guiding_);
 }
 
@@ -314,21 +321,20 @@ Image Run::imageOf(Aov aov) const {
 
 void Run::writeOutputs(OutputErrors& errors) const {
   const RunResult result{result_, guiding_, film()};
-  const std::uint64_t hash = pictureHash(*scene_);
-  Aovs aovs;
-  for (const Aov aov : job_.aovs) aovs.emplace(aov, imageOf(aov));
-  const std::vector<ImageLayer> layers = layersOf(aovs);
-  for (const auto& output : job_.outputs)
-    errors.attempt(output, [&] {
-      const ReconstructedImage written = picture();
-      ImageAttributes all = attributes(job_, hash, result);
-      if (gradients_) all["clampedFraction"] = written.clampedFraction;
-      noteClamped(kTool, output, writeImage(output, written.image, all, layers, job_.exr));
-    });
+  for (const auto& output : job_.outputs) errors.attempt(output, [&] { writePicture(output, result); });
   errors.attempt(job_.convergence, [&] { log_->write(); });
   if (!job_.stats.empty())
     errors.attempt(job_.stats, [&] { writeAtomically(job_.stats, jsonText(statistics(job_, load_, result)) + "\n"); });
   writeCheckpoint(errors);
+}
+
+void Run::writePicture(const std::filesystem::path& output, const RunResult& result) const {
+  const ReconstructedImage written = picture();
+  ImageAttributes all = attributes(job_, sceneHash_, result);
+  if (gradients_) all["clampedFraction"] = written.clampedFraction;
+  Aovs aovs;
+  for (const Aov aov : job_.aovs) aovs.emplace(aov, imageOf(aov));
+  noteClamped(kTool, output, writeImage(output, written.image, all, layersOf(aovs), job_.exr));
 }
 
 void Run::writeCheckpoint(OutputErrors& errors) const {
@@ -358,7 +364,14 @@ void Run::finish() {
     writeCheckpoint(errors_);
   if (result_.stopped && errors_.all().empty()) throw Stopped(stopMessage());
   if (result_.stopped) printWarning(kTool, "interrupted: " + stopMessage());
-  if (!errors_.all().empty()) throw std::runtime_error(fmt::format("{}", fmt::join(errors_.all(), "\n")));
+  errors_.throwIfAny();
+}
+
+void Run::rescue() {
+  if (film().sampleRange().second == 0) return;
+  printWarning(kTool, "rendering has failed; the outputs are written as they are");
+  writeOutputs(errors_);
+  for (const std::string& error : errors_.all()) printWarning(kTool, error);
 }
 
 }  // namespace
@@ -368,7 +381,12 @@ void run(const RenderJob& job, const StopFlag& stop) {
   checkFiles(job);
   Run run(job, stop);
   stoppable(stop, "before the first sample, so no picture is written", [&] { run.prepare(); });
-  run.render();
+  try {
+    run.render();
+  } catch (const std::exception&) {
+    run.rescue();
+    throw;
+  }
   run.finish();
 }
 

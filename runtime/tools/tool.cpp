@@ -15,6 +15,7 @@
 #include <system_error>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
 namespace lobe {
@@ -202,6 +203,20 @@ void checkNotRead(const std::filesystem::path& output, const std::vector<std::fi
   for (const std::filesystem::path& input : inputs)
     if (std::filesystem::equivalent(input, output, error))  // false if the input does not exist
       throw UsageError(fmt::format("{}: is both an input and the output, and would be overwritten", output.string()));
+}
+
+void OutputErrors::attempt(const std::filesystem::path& path, const std::function<void()>& write) {
+  try {
+    write();
+  } catch (const std::bad_alloc&) {
+    errors_.push_back(path.string() + ": not enough memory");
+  } catch (const std::exception& e) {
+    errors_.emplace_back(e.what());
+  }
+}
+
+void OutputErrors::throwIfAny() const {
+  if (!errors_.empty()) throw std::runtime_error(fmt::format("{}", fmt::join(errors_, "\n")));
 }
 
 void addDefinitions(CLI::App& app, std::map<std::string, std::string>& definitions) {

@@ -60,6 +60,19 @@ std::string shellQuoted(const std::string& word);
 /// Throws UsageError if writing output would overwrite one of the inputs, also by other names of the same file.
 void checkNotRead(const std::filesystem::path& output, const std::vector<std::filesystem::path>& inputs);
 
+/// Collects the errors of outputs, so that one that fails does not prevent the others.
+class OutputErrors {
+ public:
+  /// Calls `write`; if it throws, its message is added to the errors.
+  void attempt(const std::filesystem::path& path, const std::function<void()>& write);
+  const std::vector<std::string>& all() const { return errors_; }
+  /// Throws std::runtime_error with one line for each error, if there are any.
+  void throwIfAny() const;
+
+ private:
+  std::vector<std::string> errors_;
+};
+
 /// Adds the option -D NAME=VALUE, which may be repeated and fills definitions.
 void addDefinitions(CLI::App& app, std::map<std::string, std::string>& definitions);
 

@@ -20,6 +20,7 @@
 
 #include "fitter/compile.h"
 #include "runtime/image/image.h"
+#include "runtime/image/image_output.h"
 #include "runtime/tools/render_run.h"
 #include "scenes/mitsuba/reader.h"
 #include "scenes/scene_lobes.h"
@@ -213,6 +214,35 @@ int injectIntoCompile(Countdown& countdown, const SceneFolder& folder) {
 TEST_CASE("faults: whichever allocation of a render fails") {
   const SceneFolder folder(true);
   CHECK(injectIntoRender(allocations, folder) > 50);
+}
+
+TEST_CASE("faults: an allocation that fails while rendering does not lose the samples so far") {
+  const SceneFolder folder(true);
+  RenderJob job = jobIn(folder.path());
+  job.integrator = IntegratorKind::path;
+  job.samples = 64;
+  const StopFlag never = 0;
+  const fs::path picture = folder / "out" / "a.exr";
+  fs::create_directory(folder / "out");
+  {
+    const Injection counted(allocations, 0);
+    run(job, never);
+  }
+  const long calls = allocations.calls;
+  int rescued = 0;
+  for (long n = calls / 2; n < calls; n += 1 + calls / 40) {
+    fs::remove(picture);
+    try {
+      const Injection injection(allocations, n);
+      run(job, never);
+    } catch (const std::exception&) {
+      if (!fs::exists(picture)) continue;
+      const ImageAttributes all = readAttributes(picture);
+      rescued += all.contains("interrupted") || std::get<double>(all.at("samples")) < 64;
+    }
+  }
+  checkWhole(folder / "out");
+  CHECK(rescued > 0);
 }
 
 TEST_CASE("faults: whichever write of a render fails") {

@@ -117,6 +117,9 @@ TEST_CASE("agreement: lobecompare writes the variance of merged pictures and tes
     CHECK(mean == Approx(0.04 / 12).epsilon(0.05));  // 12 samples altogether
     CHECK(lobecompare("--merge " + merged + " --variance " + variance + " " + a + a).code == 1);
     CHECK(lobecompare("--variance " + variance + " " + a).code == 2);
+    const std::string other = folder / "other.exr";
+    CHECK(lobecompare("--merge " + other + " --variance /nowhere/v.exr " + a + b).code == 1);
+    CHECK(std::filesystem::exists(other));
     CHECK(lobecompare("--merge " + merged + " --variance " + merged + " " + a).code == 2);
     CHECK(lobecompare("--merge " + merged + " --variance " + (folder / "." / "merged.exr").string() + " " + a).code ==
           2);

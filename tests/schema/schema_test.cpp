@@ -251,7 +251,10 @@ TEST_CASE("schema: files are written completely or not at all") {
 
 TEST_CASE("schema: writing to a symbolic link replaces its target") {
   const TemporaryFolder folder;
+  writeAtomically(folder.path / "real", std::string("older"));
+  fs::permissions(folder.path / "real", fs::perms::owner_read | fs::perms::owner_write);
   writeAtomically(folder.path / "real", std::string("old"));
+  CHECK(fs::status(folder.path / "real").permissions() == (fs::perms::owner_read | fs::perms::owner_write));
   fs::create_symlink("real", folder.path / "link");
   writeAtomically(folder.path / "link", std::string("new"));
   CHECK(fs::is_symlink(folder.path / "link"));

@@ -54,6 +54,7 @@ TEST_CASE("render: lobecompare prints error metrics as text and JSON") {
     const ToolRun unwritable = lobecompare(reference + " " + image + " --map /nowhere/map.png");
     CHECK(unwritable.code == 1);
     CHECK(unwritable.error.find("lobecompare: error: /nowhere/map.png: cannot write") == 0);
+    CHECK(unwritable.out.find("relmse") != std::string::npos);
   }
   SECTION("a larger reference is averaged down") {
     const std::string large = folder / "large.exr";

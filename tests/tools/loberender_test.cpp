@@ -149,6 +149,8 @@ TEST_CASE("loberender: invalid command lines are errors") {
       {" --spp 1 --size 0x12", "--size"},
       {" --spp 1 --size 16x12x3", "--size"},
       {" --spp 1 --size 1000000x1000000", "--size"},
+      {" --spp 1 --size 4294967297x1", "--size"},
+      {" --spp 1 --size 16x", "--size"},
       {" --spp 1 --max-depth 0", "--max-depth"},
       {" --spp 1 --seed -1", "--seed"},
       {" --spp 1 --seed 18446744073709551616", "--seed"},

@@ -150,11 +150,11 @@ TEST_CASE("loberender: outputs beyond the file size limit are errors, and leave 
   const SceneFolder folder(true);
   // The limit lets the statistics through, but neither the pictures nor the illumination.
   const std::string render = kBin + "loberender scene.xml -o a.exr -o b.png --stats s.json --spp 1 --size 200x150" +
-                             kTraining + " --save-illumination a.illum";
+                             kTraining + " --save-illumination a.illum --record 100,140 --record-image r.png";
   CHECK(runIn(folder, "ulimit -f 28; " + render + " 2>error") == "1");
   const std::string errors = folder.bytes("error");
   CAPTURE(errors);
-  for (const char* name : {"a.exr", "b.png", "a.illum"}) {
+  for (const char* name : {"a.exr", "b.png", "a.illum", "r.png"}) {
     CHECK_THAT(errors, Contains(std::string("loberender: error: ") + name + ": cannot write: File too large"));
     CHECK_FALSE(folder.has(name));
   }
