@@ -1,10 +1,11 @@
 #!/usr/bin/python3
 """Opens a page of scripts/report in headless Chromium: the slider moves, the crop follows the keyboard, error maps appear, the page fits
-the width of a phone, and there is no script error.
+the width of a phone, and there is no script error. Also checks the tables in Markdown and the captions of scripts/draw-comparison.
 
-The argument is the folder of the tools. Exits with 77 if Chromium or Selenium is not installed.
+The argument is the folder of the tools. Exits with 77 if Chromium, Selenium or Matplotlib is not installed.
 """
 
+import hashlib
 import pathlib
 import shutil
 import subprocess
@@ -13,8 +14,10 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 SKIPPED = 77
+PEER = "another-renderer-whose-name-is-wider-than-a-phone"
 
 try:
+    from matplotlib import image
     from selenium import webdriver
     from selenium.webdriver.chrome.options import Options
     from selenium.webdriver.chrome.service import Service
@@ -22,7 +25,7 @@ try:
     from selenium.webdriver.common.keys import Keys
     from selenium.webdriver.support.select import Select
 except ImportError:
-    print("skipped: Selenium is not installed (python3-selenium)")
+    print("skipped: Selenium or Matplotlib is not installed (python3-selenium, python3-matplotlib)")
     sys.exit(SKIPPED)
 
 
@@ -36,12 +39,12 @@ def make_peer(tools, folder):
 
 
 def make_page(tools, folder):
-    out, peer = folder / "evaluation", folder / "peer"
+    out, peer = folder / "evaluation", folder / PEER
     peer.mkdir()
     make_peer(tools, peer)
     evaluate = [ROOT / "scripts/evaluate", out, "--scenes", "jewelry", "--methods", "path", "--method",
-                "depth-2.0=--integrator path --max-depth 2", "--fit", "depth-2.0=--quality 0.1", "--spp", "1", "2",
-                "--build", f"a={tools}", "--import", "peer", peer]
+                "depth-2.0=--integrator path --max-depth 2", "--fit", "depth-2.0=--quality 0.1", "--seconds", "1",
+                "--spp", "1", "2", "4", "--build", f"a={tools}", "--import", PEER, peer]
     subprocess.run(evaluate, check=True)
     before = {path: path.stat().st_mtime_ns for path in (out / "runs").rglob("*.exr")}
     subprocess.run(evaluate, check=True)
@@ -53,8 +56,28 @@ def make_page(tools, folder):
     other = subprocess.run(evaluate, capture_output=True, text=True)
     assert other.returncode == 1 and "by other tools" in other.stderr, f"pictures of other tools are mixed: {other.stderr}"
     record.write_text(of_these_tools)
-    subprocess.run([ROOT / "scripts/report", out, "--tools", tools], check=True)
+    subprocess.run([ROOT / "scripts/report", out, "--tools", tools, "--chart", ROOT / "docs/charts/slices.svg"], check=True)
     return out / "report.html"
+
+
+def check_markdown(out):
+    text = subprocess.run([ROOT / "scripts/report", out, "--markdown"], check=True, capture_output=True, text=True).stdout
+    errors, costs = (table.splitlines() for table in text.split("\n\n"))
+    assert errors[0] == f"|  | a:path | a:depth-2.0 | {PEER} |" and len(errors) == 2 + 4, errors
+    for line in errors[2:]:
+        assert line.count("**") == 2 and "**" not in line.split("|")[-2], f"not one method is the best: {line}"
+    assert "| samples per pixel | rays, millions | mean path length | training, s | memory, MB |" in costs[0], costs
+    assert len(costs) == 2 + 9 and any(line.startswith("| jewelry, spp 4 | a:path | 4 | ") for line in costs), costs
+
+
+def check_captions(out):
+    """Nothing of the captions is cut off, which would leave ink at the edges of the drawing."""
+    drawing = out / "comparison.png"
+    subprocess.run([ROOT / "scripts/draw-comparison", out, "jewelry", next((out / "runs").rglob("*.png")), "--crop", "0.4", "0.4", "0.2", "0.2",
+                    "--methods", *8 * ["a:depth-2.0"], "-o", drawing], check=True)
+    captions = image.imread(drawing)[-30:]
+    assert captions.min() < 0.5, "there are no captions"
+    assert captions[:, :3].min() == captions[:, -3:].min() == 1, "captions are cut off"
 
 
 def open_page(page):
@@ -68,7 +91,18 @@ def open_page(page):
     return driver
 
 
-def check(driver):
+def check_chart(driver, scene):
+    assert len(scene.find_elements(By.CSS_SELECTOR, "circle > title")) == 4 + 4 + 1, "not a point for each budget, and the peer's"
+    text = scene.find_element(By.CSS_SELECTOR, "svg").text
+    assert text.count("slope") == text.count("±") == 2, f"slopes and their intervals are not shown: {text}"
+    lines = [line.get_attribute("points").split() for line in scene.find_elements(By.CSS_SELECTOR, "polyline")]
+    assert max(map(len, lines)) == 3, "a line joins budgets of seconds and of samples"
+    assert driver.execute_script("return slope([[1, 1], [2, .6], [4, .2], [8, .15]])") == "-0.98 ± 0.65"
+    styles = driver.execute_script("return [...Array(22).keys()].map(index => JSON.stringify(style(index)))")
+    assert len(set(styles)) == 22, "methods look the same"
+
+
+def check(driver, tools):
     scene = driver.find_element(By.ID, "jewelry")
     right = scene.find_element(By.CSS_SELECTOR, "img.right")
     assert driver.execute_script("return arguments[0].naturalWidth", right) == 240, "the picture is not shown"
@@ -87,12 +121,15 @@ def check(driver):
     assert right.get_attribute("src") != picture, "there is no error map"
     assert scene.find_element(By.CSS_SELECTOR, ".legend").is_displayed(), "error maps have no scale"
     assert len(scene.find_elements(By.CSS_SELECTOR, ".crops figure")) == 3
-    assert len(scene.find_elements(By.CSS_SELECTOR, "svg circle")) == 5, "the chart does not have a point for each budget, and the peer's"
-    assert scene.find_element(By.CSS_SELECTOR, "svg").text.count("slope") == 2, "slopes are not shown"
+    assert "Pictures: a:path seconds 1," in scene.text, "pictures are not those of the longest time"
+    check_chart(driver, scene)
+    digest = hashlib.sha256((tools / "loberender").read_bytes()).hexdigest()
+    shown = driver.find_element(By.ID, "machine").text
+    assert "loberender " in shown and f"(hash {digest[:8]}) as a." in shown, shown
     header = [cell.text for cell in driver.find_elements(By.CSS_SELECTOR, "#table th")]
-    assert header == ["", "a:path", "a:depth-2.0", "peer"], header
+    assert header == ["", "a:path", "a:depth-2.0", PEER], header
     peers = [row.find_elements(By.TAG_NAME, "td")[3].text for row in driver.find_elements(By.CSS_SELECTOR, "#table tbody tr")]
-    assert len(peers) == 2 and peers[0] == peers[1] and peers[0].endswith(", 1.6 s"), peers
+    assert len(peers) == 4 and len(set(peers)) == 1 and peers[0].endswith(", 1.6 s"), peers
     before = scene.find_element(By.CSS_SELECTOR, ".chart svg").get_attribute("outerHTML")
     Select(scene.find_element(By.CSS_SELECTOR, "div:has(> .chart) select")).select_by_index(2)
     assert scene.find_element(By.CSS_SELECTOR, ".chart svg").get_attribute("outerHTML") != before, "the chart does not show the other error"
@@ -100,9 +137,14 @@ def check(driver):
     charts = driver.find_elements(By.CSS_SELECTOR, "#fit-charts svg")
     assert len(charts) == 2, "there are no charts of the fits"
     for fits in charts:
-        assert len(fits.find_elements(By.CSS_SELECTOR, "circle")) == len(rows) > 3, "the charts do not show every cache"
-    driver.set_window_size(500, 1600)  # the narrowest window of Chromium
-    assert driver.execute_script("return document.documentElement.scrollWidth <= innerWidth"), "too wide for a phone"
+        assert len(fits.find_elements(By.CSS_SELECTOR, "circle > title")) == len(rows) > 3, "the charts do not show every cache"
+    assert driver.find_element(By.CSS_SELECTOR, "#charts h3").text == "slices.svg"
+    drawing = driver.find_element(By.CSS_SELECTOR, "#charts img")
+    assert driver.execute_script("return arguments[0].naturalWidth", drawing) > 0, "the chart is not shown"
+    # Windows of Chromium cannot be that narrow.
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {"width": 360, "height": 800, "deviceScaleFactor": 1, "mobile": True})
+    width = driver.execute_script("return document.documentElement.scrollWidth")
+    assert width <= 360, f"too wide for a phone: {width} pixels"
     errors = driver.get_log("browser")
     assert not errors, errors
 
@@ -111,10 +153,14 @@ def main():
     if not (shutil.which("chromium") and shutil.which("chromedriver")):
         print("skipped: Chromium is not installed (chromium, chromium-driver)")
         return SKIPPED
+    tools = pathlib.Path(sys.argv[1]).resolve()
     with tempfile.TemporaryDirectory() as folder:
-        driver = open_page(make_page(pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(folder)))
+        page = make_page(tools, pathlib.Path(folder))
+        check_markdown(page.parent)
+        check_captions(page.parent)
+        driver = open_page(page)
         try:
-            check(driver)
+            check(driver, tools)
         finally:
             driver.quit()
     print("the page works")
