@@ -86,7 +86,8 @@ TEST_CASE("render: a JPEG with damaged Huffman tables is rejected or read, but n
     damaged[i] = '\xff';
     CAPTURE(i);
     try {
-      CHECK(readBytes("a.jpg", damaged).width == 17);
+      const Image image = readBytes("a.jpg", damaged);
+      CHECK(image.width == 17);
     } catch (const std::runtime_error& error) {
       CHECK_THAT(error.what(), Contains("a.jpg: ") && !Contains("\n"));
     }

@@ -33,7 +33,7 @@ struct Files {
   std::string scene = sceneOf(kBody);
   std::string mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
   /// Two pixels of 24 bits without compression.
-  std::string image = std::string("\0\0\2\0\0\0\0\0\0\0\0\0\2\0\1\0\x18\0", 18) + "abcdef";
+  std::string image = std::string("\0\0\2\0\0\0\0\0\0\0\0\0\2\0\1\0\x18\0", 18).append("abcdef");
 
   void replace(const std::string& from, const std::string& to) {
     const std::size_t at = scene.find(from);
