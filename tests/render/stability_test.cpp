@@ -71,7 +71,8 @@ struct Trial {
   const IlluminationCache& cache() const { return cacheOf(trained.field); }
   Film render(const Integrator& integrator, int samples, std::uint64_t seed) const {
     Film film(camera.width(), camera.height());
-    lobe::render(camera, integrator, film, {seed, samples, std::nullopt});
+    lobe::render(camera, integrator, film,
+                 {seed, samples, std::nullopt, PixelSampling::sobol, PixelFiltering::importance});
     return film;
   }
   Film path(int samples) const { return render(PathIntegrator(ready, {}), samples, 1); }

@@ -15,7 +15,8 @@ struct Block {
   double mean = 0, variance = 0;
 };
 
-/// Means over blocks of pixels and channels, with the variances of these means.
+/// Means over blocks of pixels and channels, with the variances of these means. The pixels must be independent, as they
+/// are with PixelFiltering::importance or a box.
 inline std::vector<Block> blocks(const Film& film, int size) {
   const Image mean = film.mean(), variance = film.varianceOfMean();
   std::vector<Block> all;

@@ -51,7 +51,9 @@ class Studio {
 
   Film render(const Integrator& integrator, int samples, std::uint64_t seed) const {
     Film film(camera_->width(), camera_->height());
-    lobe::render(*camera_, integrator, film, {seed, samples, std::nullopt});
+    // For z-tests, whose pixels must be independent.
+    lobe::render(*camera_, integrator, film,
+                 {seed, samples, std::nullopt, PixelSampling::sobol, PixelFiltering::importance});
     return film;
   }
 
