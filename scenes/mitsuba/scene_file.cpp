@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <optional>
-#include <ranges>
 #include <vector>
 
 #include <fmt/format.h>
@@ -20,11 +19,20 @@ namespace {
 // Limits on expansion: definitions that use each other, and files that include each other, can grow exponentially.
 constexpr std::size_t kLongestValue = 1 << 20, kMostIncludes = 1000, kLongestText = std::size_t{1} << 28;
 
-/// Up to ten of the names, and the number of others.
+const std::string& nameOf(const std::string& name) {
+  return name;
+}
+const std::string& nameOf(const std::pair<const std::string, std::string>& definition) {
+  return definition.first;
+}
+
+/// Up to ten of the names in a container of names or definitions, and the number of others.
 std::string listed(const auto& names) {
   constexpr std::size_t kMost = 10;
-  const std::string some = fmt::format("{}", fmt::join(names | std::views::take(kMost), ", "));
-  return names.size() > kMost ? fmt::format("{} and {} more", some, names.size() - kMost) : some;
+  std::vector<std::string> some;
+  for (auto name = names.begin(); name != names.end() && some.size() < kMost; ++name) some.push_back(nameOf(*name));
+  const std::string text = fmt::format("{}", fmt::join(some, ", "));
+  return names.size() > kMost ? fmt::format("{} and {} more", text, names.size() - kMost) : text;
 }
 
 bool isNameCharacter(char c) {
@@ -278,7 +286,7 @@ std::string SceneFile::substituted(const std::string& text, pugi::xml_node node)
     if (it == values_.end())
       fault(node,
             fmt::format("${} is not defined: neither by a <default> nor by -D{}", name,
-                        values_.empty() ? "" : fmt::format("; defined are {}", listed(std::views::keys(values_)))),
+                        values_.empty() ? "" : fmt::format("; defined are {}", listed(values_))),
             "the element is left out");
     result += it == values_.end() ? "$" + name : it->second;
     if (result.size() > kLongestValue)
