@@ -4,7 +4,6 @@
 #include <bit>
 #include <cmath>
 #include <optional>
-#include <ranges>
 #include <vector>
 
 #include <Eigen/LU>
@@ -144,9 +143,9 @@ class DirectionFits {
 
   /// Reduces the number of components while the fit stays good enough.
   FittedRecord less(FittedRecord best) const {
-    for (const std::uint32_t size : std::views::reverse(sizes_)) {
-      if (size >= best.record.count) continue;
-      FittedRecord fitted = with(size);
+    for (auto size = sizes_.rbegin(); size != sizes_.rend(); ++size) {
+      if (*size >= best.record.count) continue;
+      FittedRecord fitted = with(*size);
       if (!goodEnough(fitted)) break;
       best = std::move(fitted);
     }
