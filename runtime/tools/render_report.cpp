@@ -6,6 +6,7 @@
 #include <functional>
 #include <numeric>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include <fmt/format.h>
@@ -63,6 +64,18 @@ nlohmann::ordered_json asJson(const std::optional<LightPathTrial>& trial, bool u
           {"cost_with_light_paths", trial->costWithLight}};
 }
 
+std::string hashText(std::uint64_t hash) {
+  return fmt::format("{:016x}", hash);
+}
+
+/// In the order in which the scene first uses the caches.
+nlohmann::ordered_json cacheHashes(const Guiding& guiding) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  if (guiding.caches)
+    for (const std::uint64_t hash : guiding.caches->hashes()) list.push_back(hashText(hash));
+  return list;
+}
+
 /// In descending order.
 nlohmann::ordered_json asJson(const LargestContributions& largest) {
   std::vector<LargestContributions::Key> keys(largest.keys.begin(), largest.keys.end());
@@ -90,12 +103,16 @@ double cutFraction(const RenderJob& job, const RunResult& run) {
 
 }  // namespace
 
-nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, const RunResult& run) {
+nlohmann::ordered_json statistics(const RenderJob& job, std::uint64_t sceneHash, const LoadTimes& load,
+                                  const RunResult& run) {
   const PathStatistics& paths = run.render.statistics;
   const RenderProgress& total = run.render.total;
   nlohmann::ordered_json passes = nlohmann::ordered_json::array();
   for (const PassReport& pass : run.training().passes) passes.push_back(asJson(pass));
-  return {{"integrator", nameOf(run.integrator(job))},
+  return {{"version", LOBE_VERSION},
+          {"scene_hash", hashText(sceneHash)},
+          {"cache_hashes", cacheHashes(run.guiding)},
+          {"integrator", nameOf(run.integrator(job))},
           {"pilot", asJson(run.guiding.pilot)},
           {"light_paths", asJson(run.guiding.lightPaths, run.guiding.usesLightPaths, run.guiding.secondsLightPaths)},
           {"seed", job.seed},
@@ -135,7 +152,7 @@ ImageAttributes attributes(const RenderJob& job, std::uint64_t sceneHash, const 
                       {"integrator", std::string(nameOf(run.integrator(job)))},
                       {"seed", static_cast<double>(job.seed)},
                       {"sampleOffset", static_cast<double>(job.sampleOffset)},
-                      {"sceneHash", fmt::format("{:016x}", sceneHash)}};
+                      {"sceneHash", hashText(sceneHash)}};
   const auto [least, most] = run.film.sampleRange();
   if (least == most)
     all["samples"] = static_cast<double>(least);

@@ -39,8 +39,9 @@ struct RunResult {
   double seconds() const { return guiding.seconds() + render.total.seconds; }
 };
 
-/// The content of --stats.
-nlohmann::ordered_json statistics(const RenderJob& job, const LoadTimes& load, const RunResult& run);
+/// The content of --stats. sceneHash: pictureHash of the scene.
+nlohmann::ordered_json statistics(const RenderJob& job, std::uint64_t sceneHash, const LoadTimes& load,
+                                  const RunResult& run);
 
 /// The attributes of the picture. The same for every run with the same options, except with --seconds.
 ImageAttributes attributes(const RenderJob& job, std::uint64_t sceneHash, const RunResult& run);

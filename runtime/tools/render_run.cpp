@@ -147,7 +147,7 @@ class Run {
   std::optional<GradientFilm> gradients_;  // replaces film_ with --gradients
   std::optional<FeatureFilm> features_;    // for --aov
   RenderResult result_;
-  std::uint64_t sceneHash_ = 0;  // for the metadata of the picture
+  std::uint64_t sceneHash_ = 0;  // for statistics and the metadata of the picture
   OutputErrors errors_;
   Stopwatch sinceSnapshot_;
 };
@@ -324,7 +324,8 @@ void Run::writeOutputs(OutputErrors& errors) const {
   for (const auto& output : job_.outputs) errors.attempt(output, [&] { writePicture(output, result); });
   errors.attempt(job_.convergence, [&] { log_->write(); });
   if (!job_.stats.empty())
-    errors.attempt(job_.stats, [&] { writeAtomically(job_.stats, jsonText(statistics(job_, load_, result)) + "\n"); });
+    errors.attempt(job_.stats,
+                   [&] { writeAtomically(job_.stats, jsonText(statistics(job_, sceneHash_, load_, result)) + "\n"); });
   writeCheckpoint(errors);
 }
 

@@ -397,6 +397,13 @@ TEST_CASE("loberender: statistics and convergence and images of a run") {
     std::uintmax_t lobes = 0;
     for (const fs::path& cache : folder.caches()) lobes += fs::file_size(cache);
     CHECK(s.at("lobe_bytes") == lobes);
+    CHECK(s.at("version").get<std::string>() == LOBE_VERSION);
+    const Imf::InputFile picture((folder / "a.exr").c_str());
+    CHECK(s.at("scene_hash").get<std::string>() ==
+          picture.header().typedAttribute<Imf::StringAttribute>("sceneHash").value());
+    std::set<std::string> hashes;
+    for (const fs::path& cache : folder.caches()) hashes.insert(fmt::format("{:016x}", LobeCache::open(cache).hash()));
+    CHECK(s.at("cache_hashes").get<std::set<std::string>>() == hashes);
     CHECK(s.at("nonfinite_samples") == 0);
     double sum = 0;
     for (const auto& fraction : s.at("strategy_fractions")) sum += fraction.get<double>();

@@ -292,8 +292,8 @@ TEST_CASE("loberender: a resumed render has the bytes of an uninterrupted one") 
     CHECK_THAT(resumed.error, Contains("run.ckpt: continues with sample 3 of each pixel"));
     CHECK(folder.bytes("part.exr") == folder.bytes("whole.exr"));
     const auto whole = parseJson(folder.bytes("whole.json")), part = parseJson(folder.bytes("part.json"));
-    for (const char* key : {"rays", "spp", "training_particles", "records", "strategy_fractions", "guiding_decisions",
-                            "largest_contributions", "firefly_cut_fraction"})
+    for (const char* key : {"scene_hash", "cache_hashes", "rays", "spp", "training_particles", "records",
+                            "strategy_fractions", "guiding_decisions", "largest_contributions", "firefly_cut_fraction"})
       CHECK(whole[key] == part[key]);
     CHECK(folder.run(render + " --spp 6 -o again.exr --resume run.ckpt").code == 0);
     CHECK(folder.bytes("again.exr") == folder.bytes("whole.exr"));
