@@ -1,0 +1,45 @@
+"""Tools that only pretend to fit, render and compare, for evaluate_test.py. CACHE is the content of every cache, SCENE_HASH the hash of every
+scene."""
+
+import json
+import os
+import pathlib
+import struct
+import zlib
+
+
+def loberender(arguments):
+    if arguments == ["--version"]:
+        return print("loberender 0.0.0")
+    for option, value in zip(arguments, arguments[1:]):
+        if option == "-o" and value.endswith(".png"):
+            pathlib.Path(value).write_bytes(png(64, 40))
+        elif option == "-o":
+            pathlib.Path(value).write_text("picture")
+        elif option == "--stats":
+            numbers = ("seconds_total", "seconds_training", "seconds_rendering", "spp", "rays", "path_segments", "segments_per_second",
+                       "mean_path_length", "records", "training_particles", "peak_rss_bytes")
+            pathlib.Path(value).write_text(json.dumps({"integrator": "path", "scene_hash": os.environ["SCENE_HASH"]} | {key: 1 for key in numbers}))
+
+
+def lobefit(arguments):
+    file = pathlib.Path(arguments[arguments.index("-o") + 1]) / "a.lobe"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(os.environ["CACHE"])
+    print(json.dumps([{"file": str(file), "lobe": "a", "up_to_date": False, "seconds": 0.1}]))
+
+
+def lobecompare(arguments):
+    value = 0.02 if "/a_path-" in arguments[1] else 0.01
+    print(json.dumps({"mean_ratio": 1} | {key: number for name in ("relvar", "relvar_drop_1pct", "relvar_drop_0.1pct")
+                                          for key, number in ((name, value), (f"{name}_interval", [0.9 * value, 1.1 * value]))}))
+
+
+def png(width, height):
+    """A grey picture."""
+    def chunk(kind, content):
+        return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+
+    lines = height * (b"\0" + width * b"\x80\x80\x80")
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)) + \
+        chunk(b"IDAT", zlib.compress(lines)) + chunk(b"IEND", b"")
