@@ -1,8 +1,19 @@
-"""What the scripts that show results have in common: which results they show, and how they read them."""
+"""What the scripts that measure and show errors have in common."""
 
+import importlib.machinery
+import importlib.util
 import json
 import math
+import pathlib
 import sys
+
+
+def load_evaluate():
+    """The module scripts/evaluate, whose name has no suffix."""
+    loader = importlib.machinery.SourceFileLoader("evaluate", str(pathlib.Path(__file__).with_name("evaluate")))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("evaluate", loader))
+    loader.exec_module(module)
+    return module
 
 
 def read_summary(out):

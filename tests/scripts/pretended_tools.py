@@ -5,21 +5,31 @@ import json
 import os
 import pathlib
 import struct
+import time
 import zlib
 
 
 def loberender(arguments):
     if arguments == ["--version"]:
         return print("loberender 0.0.0")
+    for snapshot in range(3 if "--snapshot-every" in arguments else 1):
+        write_outputs(arguments, 1 + snapshot)
+        time.sleep(1 if "--snapshot-every" in arguments else 0)
+
+
+def write_outputs(arguments, samples):
     for option, value in zip(arguments, arguments[1:]):
         if option == "-o" and value.endswith(".png"):
             pathlib.Path(value).write_bytes(png(64, 40))
         elif option == "-o":
-            pathlib.Path(value).write_text("picture")
+            pathlib.Path(value).write_text(" ".join(arguments))
         elif option == "--stats":
             numbers = ("seconds_total", "seconds_training", "seconds_rendering", "spp", "rays", "path_segments", "segments_per_second",
                        "mean_path_length", "records", "training_particles", "peak_rss_bytes")
-            pathlib.Path(value).write_text(json.dumps({"integrator": "path", "scene_hash": os.environ["SCENE_HASH"]} | {key: 1 for key in numbers}))
+            stats = {"integrator": "path", "scene_hash": os.environ["SCENE_HASH"]} | {key: samples for key in numbers}
+            # At once, because scripts/bench-long-run reads it meanwhile.
+            pathlib.Path(f"{value}.tmp").write_text(json.dumps(stats))
+            pathlib.Path(f"{value}.tmp").replace(value)
 
 
 def lobefit(arguments):
