@@ -66,6 +66,7 @@ def check_plan(folder):
     assert plan["machine"]["cores"] == len(os.sched_getaffinity(0)), plan
     assert not cpus or plan["machine"]["cpu"] == cpus[0], plan
     assert plan["scenes"][SCENE]["sha256"] == sha256(ROOT / "scenes/livingroom.xml"), plan
+    assert plan["scenes"][SCENE]["scene_hashes"] == ["0a"], plan
     assert plan["builds"]["a"]["lobefit"] == sha256(folder / "tools/lobefit"), plan
     assert "--reduction 0" in plan["fits"]["product-naive"], plan
     of_naive = f"caches/a+product-naive/{SCENE}"
