@@ -1,6 +1,6 @@
 #pragma once
 // The compiled BRDF caches of a scene. The files are written by the tool lobefit or by compileLobe (lobe/fitting.h);
-// they are opened once and shared by all threads.
+// they are read once, and all threads share the memory.
 
 #include <cstddef>
 #include <cstdint>
@@ -21,10 +21,11 @@ struct LobeRequest {
   std::string material;    ///< name of the material, for error messages
 };
 
-/// The opened BRDF caches. Immutable: all functions may be called from any thread. Copies share the files and memory.
+/// The BRDF caches, read into memory: later changes of the files have no effect. Immutable: all functions may be called
+/// from any thread. Copies share their memory.
 class LobeCacheSet {
  public:
-  /// Opens the file of every request in the folder; requests with equal keys share one file. `reduction` ≥ 0: the
+  /// Reads the file of every request from the folder; requests for equal lobes share one file. `reduction` ≥ 0: the
   /// Gaussians of each record are merged until the sum of the merge costs would exceed it (Runnalls' cost, Herholz et
   /// al. 2016, Appendix B); 0 merges none. Throws std::runtime_error with a one-line message that lists every missing,
   /// stale or damaged file with its materials and ends with `remedy`, the command that creates the files.

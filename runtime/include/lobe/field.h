@@ -57,8 +57,9 @@ class Field {
   Field(const Field&);
   Field& operator=(const Field&);
 
-  /// Reads a file that save wrote. The field can be used for rendering, but not trained further. Throws
-  /// std::runtime_error that names the file if it is missing, damaged or of another major format version.
+  /// Reads a file that save wrote. The field can be used for rendering, or as the `earlier` one of a new field, but not
+  /// trained further. Throws std::runtime_error that names the file if it is missing, damaged or of another major
+  /// format version.
   static Field load(const std::filesystem::path& path);
   /// Writes the records to a file. Equal fields give equal bytes. The file is replaced atomically: if writing fails, an
   /// existing file stays unchanged, and std::runtime_error that names the file is thrown.
@@ -91,10 +92,12 @@ class Field {
   /// (Runnalls' cost, Herholz et al. 2016, Appendix B). A record of up to four components takes about half the memory.
   Field reduced(float cost) const;
 
-  std::size_t records() const;          ///< number of records
-  std::size_t bytes() const;            ///< memory of the records and their look-up structure
-  double meanComponents() const;        ///< mean number of Gaussians per record; 0 if there are no records
-  double undersampledFraction() const;  ///< fraction of records with < 5 particles per Gaussian; 0 if not trainable
+  std::size_t records() const;    ///< number of records
+  std::size_t bytes() const;      ///< memory of the records and their look-up structure
+  double meanComponents() const;  ///< mean number of Gaussians per record; 0 if there are no records
+  /// Fraction of the records that were trained with fewer than 5 particles per Gaussian; 0 if the field cannot be
+  /// trained.
+  double undersampledFraction() const;
 
  private:
   friend class SurfaceDistribution;

@@ -31,8 +31,8 @@ struct LobeFunctions {
   int revision = 1;
   /// Whether the value changes when wo and wi are rotated together about the normal.
   bool anisotropic = false;
-  /// Whether the value is unchanged when wo and wi are both reflected in the x axis, and likewise in the y axis. Only a
-  /// quarter of the directions of an anisotropic lobe needs to be fitted then.
+  /// Whether the value is unchanged when wo and wi are both mirrored in the xz plane, and when both are mirrored in the
+  /// yz plane. Only a quarter of the directions of an anisotropic lobe needs to be fitted then.
   bool mirrorSymmetric = false;
 
   /// The value of the BRDF in 1/sr, without the cosine; ≥ 0 and finite.
@@ -45,9 +45,9 @@ struct LobeFunctions {
 
 struct FittingOptions {
   std::filesystem::path folder = "lobes";  ///< folder of the cache files; created if it does not exist
-  /// Target relative variance (NEV) of a record, > 0: the variance, divided by the squared mean, of one sample that
-  /// estimates the reflection of uniform light, ∫ ρ cosθ dω. The sample has a density of 10 % lobe sampling and 90 %
-  /// fitted mixture times cosθ (Herholz et al. 2016, Appendix C).
+  /// Target relative variance (NEV) of a record, > 0: the variance, divided by the squared mean, of the one-sample
+  /// estimate of ∫ ρ cosθ dω, the reflection of uniform light. The sample is drawn with probability 0.1 by the sampler
+  /// of the lobe, and otherwise from the fitted mixture times cosθ (Herholz et al. 2016, Appendix C).
   float quality = 0.03f;
   int components = 8;  ///< largest number of Gaussians per record, 1 to 32
   bool force = false;  ///< fit again even if the cache file is up to date

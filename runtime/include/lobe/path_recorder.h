@@ -16,7 +16,7 @@ struct RecordedVertex {
   Float3 position, normal;  ///< world space; normal: unit geometric normal, facing either side
   Float3 direction;         ///< the sampled direction: unit, world space, away from the surface
   Float3 wi;                ///< the same direction in the shading frame of the ShadingPoint
-  float pdf;                ///< density over solid angle with which it was sampled, > 0
+  float pdf;                ///< density over solid angle with which the direction was sampled, > 0
   float bsdfPdf = 0;        ///< density of the BSDF's own sampler, over solid angle; used only if learnsFraction()
   Float3 weight;            ///< BSDF value times |cosθ| / pdf
   Float3 throughput;        ///< path throughput, including `weight`, before Russian roulette at this vertex
@@ -48,9 +48,9 @@ class PathRecorder {
   /// (the default) if the ray hits nothing.
   void setDistance(float distance);
 
-  /// Adds light that the path collects, as a contribution to the pixel: radiance times throughput and multiple
-  /// importance weight. It is credited to all vertices added so far. Light collected by next-event estimation at a
-  /// surface is therefore added before addVertex of that surface.
+  /// Adds light that the path collects, as a contribution to the pixel: radiance times throughput and the weight of
+  /// multiple importance sampling. It counts as incident radiance at all vertices added so far. Light collected by
+  /// next-event estimation at a surface must therefore be added before addVertex of that surface.
   void addLight(const Float3& contribution);
 
   /// Ends the path and writes its samples to the storage. Samples that are not positive and finite are omitted.

@@ -19,7 +19,7 @@
 //   pdf = distribution.bsdfProbability() * bsdf.pdf(wi) + distribution.guidedPdf(wi);
 //
 // Estimates with this density are unbiased whatever the field has learnt, because the probability of BSDF sampling is
-// always positive.
+// always positive, provided that the BSDF's own sampler reaches every direction in which the BSDF is positive.
 
 #include <cstddef>
 #include <cstdint>
