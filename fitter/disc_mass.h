@@ -13,8 +13,7 @@ struct DiscMass {
 };
 
 /// The masses of Σ weight·N, by one-dimensional quadrature over the azimuth about each mean; the radial integral is in
-/// closed form.
-/// The absolute error is below 1e-5 for means inside the disc.
+/// closed form. The absolute error is below 1e-5 for means inside the disc.
 DiscMass discMass(std::span<const Gaussian> mixture);
 
 }  // namespace lobe

@@ -17,7 +17,7 @@ inline constexpr double kGradedBsdfFraction = 0.1;
 /// where q is the density of the lobe's own sampler. Samples that the sampler rejects count as f = 0. All values are 0
 /// where nothing is reflected.
 struct Quality {
-  /// The value that fits are compared by. Each of the two estimates may miss regions that its points do not sample.
+  /// The value by which fits are compared: each of the two estimates may miss regions that its points do not sample.
   double worse() const { return std::max(nev, coverage); }
 
   double nev;       ///< estimated with points drawn from p

@@ -20,9 +20,10 @@ inline constexpr std::uint32_t kFitRevision = 4;
 // Herholz et al. 2016, Eq. 8; automatic: the cheapest of wem and ceres that meets the quality target (adaptive_fit.h).
 
 struct FittedRecord {
-  Mixture mixture;                                                          ///< weights sum to one
-  CacheRecord record;                                                       ///< first is 0, count is mixture.size()
-  float worse() const { return std::max(record.nev, record.nevCoverage); }  ///< see Quality::worse
+  Mixture mixture;     ///< weights sum to one
+  CacheRecord record;  ///< first is 0, count is mixture.size()
+  /// See Quality::worse.
+  float worse() const { return std::max(record.nev, record.nevCoverage); }
 };
 
 /// Fits mixtures for one direction, reusing the samples of the lobe. Keeps a reference to the lobe.

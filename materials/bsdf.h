@@ -53,7 +53,7 @@ struct LobeTint {
   float tint;
 };
 
-/// Maximum number of lobes at one surface point; look-ups use fixed arrays of this size. A BSDF may have more lobes in
+/// Maximum number of lobes at one surface point; LobeMixture has an array of this size. A BSDF may have more lobes in
 /// total, because different points of its surface may use different ones.
 inline constexpr int kMaxLobes = 4;
 
@@ -93,9 +93,9 @@ class Bsdf {
     return 0.0f;
   }
 
-  /// The transmission of the delta component, if there is exactly one direction of it, so that samples of sampleDelta
-  /// on the other side of the surface all have that direction. Next-event estimation follows it. nullopt: there is
-  /// none, it has several directions, or the model does not say.
+  /// The delta transmission, if it has exactly one direction: that of all samples of sampleDelta on the other side of
+  /// the surface. Next-event estimation follows it. nullopt: there is no delta transmission, it has several directions,
+  /// or the model does not provide it.
   virtual std::optional<DeltaTransmission> deltaTransmission(const Vec3& wo, const Vec2& uv) const {
     (void)wo, (void)uv;
     return std::nullopt;

@@ -19,10 +19,10 @@ struct ComplexIor {
   Rgb k;
 };
 
-/// Reads material (default Cu, as in Mitsuba 0.6; "none" is a perfect mirror; a suffix "_palik" is ignored), eta, k and
-/// ext_eta (default air), by which eta and k are divided. Negative components of eta and k are replaced by their
-/// absolute values, with a note. Throws ParameterError for an unknown name, a number that is not finite, or an ext_eta
-/// that is not positive.
+/// Reads material (default Cu, as in Mitsuba 0.6, which the scene reader replaces by "none" from version 2; "none" is a
+/// perfect mirror; a suffix "_palik" is ignored), eta, k and ext_eta (default air), by which eta and k are divided.
+/// Negative components of eta and k are replaced by their absolute values, with a note. Throws ParameterError for an
+/// unknown name, a number that is not finite, or an ext_eta that is not positive.
 ComplexIor readConductor(const Parameters& parameters);
 
 }  // namespace lobe

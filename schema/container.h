@@ -1,6 +1,6 @@
 #pragma once
-// The container of all cache files: a 32-byte header that identifies the file type and allows to verify its integrity,
-// followed by the payload (a FlatBuffer). Little-endian.
+// The container of all cache files: a 32-byte header that identifies the file type and contains a hash for verifying
+// its integrity, followed by the payload (a FlatBuffer). Little-endian.
 //
 //   offset 0   magic "LOBEBRDF" (the last four letters are the kind)
 //          8   format version: major u16, minor u16, then 4 zero bytes

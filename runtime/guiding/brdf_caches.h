@@ -1,5 +1,5 @@
 #pragma once
-// The BRDF caches of a scene: opened once, then looked up at every path vertex. This is the content of LobeCacheSet.
+// The BRDF caches of a scene: read once, then looked up at every path vertex. This is the content of LobeCacheSet.
 
 #include <cstdint>
 #include <filesystem>

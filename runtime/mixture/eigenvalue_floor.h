@@ -1,4 +1,5 @@
 #pragma once
+// Covariances in single precision that are positive definite.
 
 #include <algorithm>
 #include <cmath>
