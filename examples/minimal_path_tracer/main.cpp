@@ -285,7 +285,7 @@ int main() {
   std::printf("%s: %zu records, relative variance at most %.3f\n", compiled.file.filename().c_str(), compiled.records,
               compiled.worstRelativeVariance);
   const std::vector<lobe::LobeRequest> requests{{glossy.model, glossy.key, glossy.revision, "glossy sphere"}};
-  const lobe::LobeCacheSet caches(fitting.folder, requests, "run minimal_path_tracer again");
+  const lobe::LobeCacheSet caches(fitting.folder, requests, "minimal_path_tracer");
 
   const lobe::Field field = train(caches);
   std::printf("%zu illumination records\n", field.records());
