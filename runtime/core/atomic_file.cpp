@@ -4,8 +4,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 #include <stdexcept>
 #include <system_error>
@@ -46,18 +48,45 @@ fs::path targetOf(const fs::path& path) {
   return target;
 }
 
-/// A file beside target that is removed unless it replaces target.
+/// The signal that will end the program when there are no temporary files any more (0: none), and the number of these.
+std::atomic<int> endingSignal = 0, temporaries = 0;
+static_assert(std::atomic<int>::is_always_lock_free, "signal handlers use them");
+
+void endBy(int signal) {
+  std::signal(signal, SIG_DFL);
+  std::raise(signal);
+}
+
+/// A writer counts its file before it looks at endingSignal, so that none is created after the program has seen none.
+extern "C" void endWithoutTemporaries(int signal) {
+  endingSignal = signal;
+  if (temporaries == 0) endBy(signal);
+}
+
+/// While it exists, endWithoutTemporaries does not end the program; the last one does so when it is destroyed.
+class SignalsDeferred {
+ public:
+  SignalsDeferred() { ++temporaries; }
+  SignalsDeferred(const SignalsDeferred&) = delete;
+  SignalsDeferred& operator=(const SignalsDeferred&) = delete;
+  ~SignalsDeferred() {
+    if (--temporaries == 0 && endingSignal != 0) endBy(endingSignal);
+  }
+};
+
+/// A file beside target that is removed unless it replaces target. If a signal is going to end the program, it is not
+/// written on, and errors are thrown.
 class Temporary {
  public:
   /// Creates an empty file. path names the target in messages.
   Temporary(const fs::path& target, const fs::path& path) : target_(target), path_(path) {
     static std::atomic<unsigned> counter = 0;
+    refuseIfEnding();
     do {
       temporary_ = target.parent_path() / nameFor(target, counter++);
       file_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     } while (file_ < 0 && errno == EEXIST);
     if (file_ < 0) refuse(path_, errno);
-    keepPermissions();
   }
   Temporary(const Temporary&) = delete;
   Temporary& operator=(const Temporary&) = delete;
@@ -66,9 +95,17 @@ class Temporary {
     if (!replaced_) ::unlink(temporary_.c_str());
   }
 
+  /// Gives the file the permissions of the file that it replaces, if there is one.
+  void keepPermissions() const {
+    struct stat status;
+    if (::stat(target_.c_str(), &status) == 0 && ::fchmod(file_, status.st_mode & 07777) != 0) refuse(path_, errno);
+  }
+
   void write(std::span<const std::byte> bytes) {
+    constexpr std::size_t kBlock = 1 << 24;  // between which signals are noticed
     while (!bytes.empty()) {
-      const ssize_t written = ::write(file_, bytes.data(), bytes.size());
+      refuseIfEnding();
+      const ssize_t written = ::write(file_, bytes.data(), std::min(bytes.size(), kBlock));
       if (written >= 0)
         bytes = bytes.subspan(static_cast<std::size_t>(written));
       else if (errno != EINTR)
@@ -93,14 +130,13 @@ class Temporary {
     return fmt::format(".{}{}", target.filename().string().substr(0, kMaxLength - 1 - unique.size()), unique);
   }
 
-  /// Gives the file the permissions of the file that it replaces, if there is one.
-  void keepPermissions() {
-    struct stat status;
-    if (::stat(target_.c_str(), &status) == 0 && ::fchmod(file_, status.st_mode & 07777) != 0) refuse(path_, errno);
+  void refuseIfEnding() const {
+    if (endingSignal != 0) refuse(path_, EINTR);
   }
 
   int close() { return file_ < 0 ? 0 : ::close(std::exchange(file_, -1)); }
 
+  const SignalsDeferred deferred_;  // first, so that the file is removed before
   fs::path target_, path_, temporary_;
   int file_ = -1;
   bool replaced_ = false;
@@ -110,6 +146,7 @@ class Temporary {
 
 void writeAtomically(const fs::path& path, std::span<const std::byte> bytes) {
   Temporary temporary(targetOf(path), path);
+  temporary.keepPermissions();
   temporary.write(bytes);
   temporary.replaceTarget();
 }
@@ -120,6 +157,14 @@ void writeAtomically(const fs::path& path, const std::string& text) {
 
 void checkWritable(const fs::path& path) {
   const Temporary created(targetOf(path), path);
+  created.keepPermissions();
+}
+
+void endAfterWriting(int signal) {
+  struct sigaction action {};
+  action.sa_handler = endWithoutTemporaries;
+  action.sa_flags = SA_RESTART;
+  ::sigaction(signal, &action, nullptr);
 }
 
 }  // namespace lobe

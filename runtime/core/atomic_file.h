@@ -17,4 +17,8 @@ void writeAtomically(const std::filesystem::path& path, const std::string& text)
 /// whose result is written to `path`.
 void checkWritable(const std::filesystem::path& path);
 
+/// Makes the signal end the program as it does by default, but not before writeAtomically has given up or completed the
+/// files that are being written, so that no temporary file remains. Also for signal handlers.
+void endAfterWriting(int signal);
+
 }  // namespace lobe

@@ -18,6 +18,8 @@
 #include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
+#include "runtime/core/atomic_file.h"
+
 namespace lobe {
 namespace {
 
@@ -35,6 +37,19 @@ void openClosedStreams() {
 /// program.
 void ignoreSignalsOfWrites() {
   for (const int signal : {SIGXFSZ, SIGPIPE}) std::signal(signal, SIG_IGN);
+}
+
+/// Whether the program has been started with the signal ignored, as background jobs of shells are.
+bool isIgnored(int signal) {
+  struct sigaction action {};
+  ::sigaction(signal, nullptr, &action);
+  return action.sa_handler == SIG_IGN;
+}
+
+/// Makes signals that end the program leave no temporary files.
+void deferSignalsWhileWriting() {
+  for (const int signal : {SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGXCPU})
+    if (!isIgnored(signal)) endAfterWriting(signal);
 }
 
 /// Throws std::system_error if something printed to stdout could not be written.
@@ -57,13 +72,13 @@ int fail(const std::string& name, std::string_view message, int code) {
 StopFlag stopSignal = 0;
 static_assert(StopFlag::is_always_lock_free, "it is set by a signal handler");
 
-/// The next signal ends the program at once. Signals that are ignored stay so.
+/// The next signal ends the program. Signals that are ignored stay so.
 extern "C" void requestStop(int signal) {
   stopSignal = signal;
   for (const int other : {SIGINT, SIGTERM}) {
     struct sigaction action {};
     ::sigaction(other, nullptr, &action);
-    if (action.sa_handler == requestStop) std::signal(other, SIG_DFL);
+    if (action.sa_handler == requestStop) endAfterWriting(other);
   }
 }
 
@@ -136,9 +151,8 @@ void printDiagnostic(std::string_view text) {
 
 const StopFlag& stopOnSignals() {
   for (const int signal : {SIGINT, SIGTERM}) {
+    if (isIgnored(signal)) continue;
     struct sigaction action {};
-    ::sigaction(signal, nullptr, &action);
-    if (action.sa_handler == SIG_IGN) continue;  // as in background jobs of shells
     action.sa_handler = requestStop;
     action.sa_flags = SA_RESTART;
     ::sigaction(signal, &action, nullptr);
@@ -151,6 +165,7 @@ int runTool(const std::string& name, const std::string& description, int argc, c
             const std::vector<RenamedOption>& renamed) {
   openClosedStreams();
   ignoreSignalsOfWrites();
+  deferSignalsWhileWriting();
   CLI::App app(description, name);
   try {
     app.option_defaults()->always_capture_default();

@@ -45,7 +45,7 @@ int runTool(const std::string& name, const std::string& description, int argc, c
 void printDiagnostic(std::string_view text);
 
 /// A flag that holds the number of the first SIGINT or SIGTERM after this call, for work that can end early and leave
-/// complete files. The second one ends the program at once. Ignored signals stay ignored.
+/// complete files. The second one ends the program. Ignored signals stay ignored.
 const StopFlag& stopOnSignals();
 
 /// Prints "NAME: warning: MESSAGE" to stderr.

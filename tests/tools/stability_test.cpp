@@ -264,6 +264,21 @@ TEST_CASE("lobefit: an interruption keeps the caches that are complete") {
   CHECK(folder.caches().empty());
 }
 
+TEST_CASE("tools: signals while an output is written leave no temporary files") {
+  const SceneFolder folder(true);
+  REQUIRE(folder.run(kPath + " --spp 1 -o a.exr").code == 0);
+  const std::string cache = fs::relative(folder.caches().front(), folder.path()).string();
+  const auto isHidden = [](const std::string& name) { return fs::path(name).filename().string().starts_with("."); };
+  for (const std::string& command :
+       {std::string("lobecompare a.exr a.exr --map map.png"), std::string("lobecompare --png a.exr b.png"),
+        "lobedump " + cache + " --html cache.html", kPath + " --spp 1 -o b.exr", kQuickFit + " -o others"}) {
+    CAPTURE(command);
+    const std::string preload = "exec env LD_PRELOAD='" LOBE_SIGNALS_AT_FSYNC "' " + kBin;
+    CHECK(runIn(folder, preload + command + " >/dev/null 2>&1") == "signal");
+    CHECK(std::ranges::none_of(folder.names(), isHidden));
+  }
+}
+
 TEST_CASE("loberender: a second interruption ends at once") {
   const SceneFolder folder(false);
   Background render(folder, kLong + " --snapshot-every 0.1");
