@@ -1,20 +1,17 @@
 #include "scenes/meshes/polygon.h"
 
-#include <algorithm>
 #include <numeric>
+#include <stdexcept>
 
 #include <Eigen/Geometry>
+
+#include "scenes/meshes/corner_tree.h"
 
 namespace lobe {
 namespace {
 
 using Corners = std::vector<Eigen::Vector3d>;
 using Triangle = std::array<std::size_t, 3>;
-
-double orientation(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
-                   const Eigen::Vector3d& normal) {
-  return (b - a).cross(c - a).dot(normal);
-}
 
 Eigen::Vector3d areaVector(const Corners& corners) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -23,12 +20,13 @@ Eigen::Vector3d areaVector(const Corners& corners) {
 }
 
 /// The remaining corners as a ring. Clipping an ear affects only whether its two neighbours are ears (Eberly,
-/// "Triangulation by Ear Clipping"), so there are O(n) tests, each of which visits the ring once.
+/// "Triangulation by Ear Clipping"), so there are O(n) tests.
 class EarClipper {
  public:
   explicit EarClipper(const Corners& corners)
       : corners_(corners),
         normal_(areaVector(corners)),
+        tree_(corners, normal_),
         next_(corners.size()),
         previous_(corners.size()),
         isEar_(corners.size()),
@@ -37,11 +35,22 @@ class EarClipper {
     next_.back() = 0;
     for (std::size_t i = 0; i < left_; ++i) previous_[next_[i]] = i;
     for (std::size_t i = 1; i < left_; ++i) isEar_[i] = testEar(i);
+    triangles_.reserve(left_ - 2);
   }
 
+  /// Clips the first ear again and again. The first corner is never clipped, so that a convex polygon becomes the fan
+  /// about it. Where no ear is left, as in self-intersecting polygons, the second corner is clipped, and no other one
+  /// can become an ear: the rest becomes a fan, too.
   std::vector<Triangle> run() {
-    while (left_ > 3) clip(findEar());
-    triangles_.push_back(triangleAt(next_[0]));
+    for (std::size_t i = next_[0]; i != 0 && left_ > 3;) {
+      if (!isEar_[i]) {
+        i = next_[i];
+        continue;
+      }
+      clip(i);
+      i = previous_[i] == 0 ? next_[i] : previous_[i];  // no earlier corner is an ear
+    }
+    for (std::size_t i = next_[0]; next_[i] != 0; i = next_[i]) triangles_.push_back({0, i, next_[i]});
     return std::move(triangles_);
   }
 
@@ -50,33 +59,18 @@ class EarClipper {
 
   /// Whether the corner is an ear: its triangle has the orientation of the polygon, and no other corner lies inside it
   /// or on its edge, where the outline may turn inwards. A straight corner is an ear, because its triangle has no area.
-  bool testEar(std::size_t i) const {
-    const auto [before, at, after] = triangleAt(i);
-    const Eigen::Vector3d &a = corners_[before], &b = corners_[at], &c = corners_[after];
-    const double area = orientation(a, b, c, normal_);
-    if (area <= 0) return area == 0;
-    for (std::size_t k = next_[after]; k != before; k = next_[k]) {
-      const Eigen::Vector3d& p = corners_[k];
-      if (p == a || p == b || p == c) continue;
-      if (orientation(a, b, p, normal_) >= 0 && orientation(b, c, p, normal_) >= 0 &&
-          orientation(c, a, p, normal_) >= 0)
-        return false;
-    }
-    return true;
-  }
-
-  /// The first ear, starting at the second corner; the second corner itself if there is none, as in self-intersecting
-  /// polygons. The first corner is never clipped, so that a convex polygon becomes a fan about it.
-  std::size_t findEar() const {
-    for (std::size_t i = next_[0]; i != 0; i = next_[i])
-      if (isEar_[i]) return i;
-    return next_[0];
+  bool testEar(std::size_t i) {
+    const Triangle triangle = triangleAt(i);
+    const auto& [before, at, after] = triangle;
+    const double area = orientation(corners_[before], corners_[at], corners_[after], normal_);
+    return area > 0 ? !tree_.anyIn(triangle) : area == 0;
   }
 
   void clip(std::size_t ear) {
     const auto [before, at, after] = triangles_.emplace_back(triangleAt(ear));
     next_[before] = after;
     previous_[after] = before;
+    tree_.remove(ear);
     --left_;
     for (const std::size_t neighbour : {before, after})
       if (neighbour != 0) isEar_[neighbour] = testEar(neighbour);
@@ -84,6 +78,7 @@ class EarClipper {
 
   const Corners& corners_;
   Eigen::Vector3d normal_;
+  CornerTree tree_;  // of the remaining corners
   std::vector<std::size_t> next_, previous_;
   std::vector<char> isEar_;
   std::size_t left_;
@@ -103,7 +98,10 @@ void appendPolygon(TriangleMesh& mesh, std::span<const std::uint32_t> corners) {
   }
   Corners positions;
   positions.reserve(corners.size());
-  for (const std::uint32_t i : corners) positions.push_back(mesh.positions[i].cast<double>());
+  for (const std::uint32_t i : corners) {
+    if (!mesh.positions[i].allFinite()) throw std::runtime_error("a vertex position is not a finite number");
+    positions.push_back(mesh.positions[i].cast<double>());
+  }
   for (const auto& [i, j, k] : triangulate(positions)) mesh.triangles.push_back({corners[i], corners[j], corners[k]});
 }
 
