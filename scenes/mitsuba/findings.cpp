@@ -54,7 +54,7 @@ SceneError::SceneError(std::vector<Fault> all) : std::runtime_error(describe(all
 void Findings::fault(std::string where, const std::string& kind, std::string message, std::string consequence) {
   const auto [entry, isNew] = faultOfKind_.try_emplace(kind, faults_.size());
   if (isNew && faults_.size() >= kMostKinds) throw SceneError(faults_);
-  // Definitions are read again after each included file, so the same fault may be reported twice.
+  // Some elements are read twice, and report the same fault again.
   if (!places_.emplace(entry->second, where).second) return;
   if (isNew)
     faults_.push_back({std::move(where), std::move(message), std::move(consequence)});

@@ -16,8 +16,10 @@
 namespace lobe {
 namespace {
 
-// Limits on expansion: definitions that use each other, and files that include each other, can grow exponentially.
-constexpr std::size_t kLongestValue = 1 << 20, kMostIncludes = 1000, kLongestText = std::size_t{1} << 28;
+// Limits on expansion: definitions that use each other, and files that include each other, can grow exponentially. A
+// file is looked for in all folders.
+constexpr std::size_t kLongestValue = 1 << 20, kMostIncludes = 1000, kLongestText = std::size_t{1} << 28,
+                      kMostFolders = 1000;
 
 const std::string& nameOf(const std::string& name) {
   return name;
@@ -60,14 +62,23 @@ TextRange bodyOfScene(std::string_view text, std::size_t root) {
   return {begin, text.rfind("</scene")};
 }
 
+/// The <include> element of a well-formed file that begins there.
+TextRange rangeOfInclude(std::string_view text, std::size_t begin) {
+  std::size_t end = endOfTag(text, begin);
+  if (text[end - 2] != '/') end = endOfTag(text, text.find("</include", end));
+  return {begin, end};
+}
+
 /// The first error in the XML; an empty message if there is none.
 struct ParseFault {
   std::size_t offset = 0;
   std::string message;
 };
 
-/// The only <scene> at the top of a document.
-pugi::xml_node sceneIn(const pugi::xml_document& document, const pugi::xml_parse_result& result, ParseFault& fault) {
+/// Parses the text. Returns the only <scene> at the top of the document; null if there is a fault.
+pugi::xml_node sceneIn(pugi::xml_document& document, std::string_view text, ParseFault& fault) {
+  const pugi::xml_parse_result result =
+      document.load_buffer(text.data(), text.size(), pugi::parse_default, pugi::encoding_utf8);
   // "Error parsing start element tag" and the like, from pugixml's table.
   if (!result) fault = {static_cast<std::size_t>(result.offset), fmt::format("broken XML: {}", result.description())};
   if (!result) return {};
@@ -121,28 +132,27 @@ std::optional<std::filesystem::path> fileOfSimilarName(std::filesystem::path fol
 
 SceneFile::SceneFile(const std::filesystem::path& path, const std::map<std::string, std::string>& definitions,
                      Findings& findings)
-    : findings_(findings),
-      files_{{path, readXmlText(path), 0, {}}},
-      text_(files_[0].text),
-      segments_{{0, 0, 0}},
-      values_(definitions) {
-  files_[0].lines = indexLines(text_);
-  do {
-    throwIfCancelled();
-    parse();
-    readDefaults();
-    readFolders();
-  } while (expandInclude());
+    : findings_(findings), values_(definitions) {
+  Expansion expansion;
+  {
+    pugi::xml_document document;
+    const std::size_t file = addFile(path, 0);
+    const pugi::xml_node scene = parseAlone(file, document);
+    expand(file, scene, {0, files_[file].text.size()}, expansion);
+  }
+  text_ = std::move(expansion.text);
+  segments_ = std::move(expansion.segments);
+  parse();
+  folders_.clear();  // they are in the order in which the files were opened, not in that of the elements
+  readFolders(scene_, 0);
   substitute(scene_);
   indexIds(scene_);
   indexAliases();
 }
 
 void SceneFile::parse() {
-  const pugi::xml_parse_result result =
-      document_.load_buffer(text_.data(), text_.size(), pugi::parse_default, pugi::encoding_utf8);
   ParseFault fault;
-  scene_ = sceneIn(document_, result, fault);
+  scene_ = sceneIn(document_, text_, fault);
   if (!scene_) fail(static_cast<std::ptrdiff_t>(fault.offset), fault.message);
   checkDepth();
 }
@@ -163,98 +173,109 @@ void SceneFile::checkDepth() const {
   } while (node != scene_);
 }
 
-void SceneFile::fault(pugi::xml_node node, const std::string& message, const std::string& consequence) {
-  findings_.fault(where(node), message, message, consequence);
+void SceneFile::fault(std::ptrdiff_t location, const std::string& message, const std::string& consequence) {
+  findings_.fault(where(location), message, message, consequence);
 }
 
-void SceneFile::readDefaults() {
-  for (const pugi::xml_node node : scene_.children("default")) {
+/// The text of the scene begins at the location `start`.
+void SceneFile::readDefaults(pugi::xml_node scene, std::ptrdiff_t start) {
+  for (const pugi::xml_node node : scene.children("default")) {
     const pugi::xml_attribute name = node.attribute("name"), value = node.attribute("value");
+    const std::ptrdiff_t at = start + location(node);
     if (!name || !value) {
-      fault(node, "<default> needs a name and a value", "it is ignored");
+      fault(at, "<default> needs a name and a value", "it is ignored");
       continue;
     }
     usedNames_.insert(name.value());
-    if (!values_.contains(name.value())) values_.emplace(name.value(), substituted(value.value(), node));
+    if (!values_.contains(name.value())) values_.emplace(name.value(), substituted(value.value(), at));
   }
 }
 
-void SceneFile::readFolders() {
-  folders_.clear();
-  for (const pugi::xml_node node : scene_.children("path")) {
-    const std::filesystem::path folder = resolve(substituted(node.attribute("value").value(), node), location(node));
+/// The text of the scene begins at the location `start`.
+void SceneFile::readFolders(pugi::xml_node scene, std::ptrdiff_t start) {
+  for (const pugi::xml_node node : scene.children("path")) {
+    const std::ptrdiff_t at = start + location(node);
+    if (folders_.size() == kMostFolders) fail(at, fmt::format("more than {} <path>s", kMostFolders));
+    const std::filesystem::path folder = resolve(substituted(node.attribute("value").value(), at), at);
     if (!node.attribute("value"))
-      fault(node, "<path> needs a value", "it is ignored");
+      fault(at, "<path> needs a value", "it is ignored");
     else if (!std::filesystem::is_directory(folder))
-      fault(node, fmt::format("<path>: there is no folder {}", folder.string()), "it is ignored");
+      fault(at, fmt::format("<path>: there is no folder {}", folder.string()), "it is ignored");
     else
       folders_.push_back(folder);
   }
 }
 
-/// Replaces the first <include> by the content of its file, or removes it when that fails. Returns whether there was
-/// one.
-bool SceneFile::expandInclude() {
-  const pugi::xml_node include = scene_.child("include");
-  if (!include) return false;
-  const auto begin = static_cast<std::size_t>(location(include));
-  std::size_t end = endOfTag(text_, begin);
-  if (text_[end - 2] != '/') end = endOfTag(text_, text_.find("</include", end));
-  const std::size_t around = segmentAt(begin).file;
-  try {
-    const std::size_t file = addFile(include);
-    if (text_.size() + files_[file].text.size() > kLongestText)
-      fail(include, fmt::format("the file with all included files is longer than {} bytes", kLongestText));
-    splice(begin, end, {file, bodyOf(file)});
-  } catch (const SceneError& error) {
-    for (const Fault& fault : error.faults())
-      findings_.fault(fault.where, fault.message, fault.message, "the included file is left out");
-    splice(begin, end, {around, {0, 0}});
-  }
-  return true;
-}
-
-std::size_t SceneFile::addFile(pugi::xml_node include) {
-  const pugi::xml_attribute name = include.attribute("filename");
-  if (!name) fail(include, "<include> needs a filename");
-  if (files_.size() > kMostIncludes) fail(include, fmt::format("more than {} <include>s", kMostIncludes));
-  const std::filesystem::path path = resolve(substituted(name.value(), include), location(include));
-  if (!std::filesystem::is_regular_file(path)) fail(include, fmt::format("<include>: no file {}", path.string()));
-  const std::size_t parent = segmentAt(static_cast<std::size_t>(location(include))).file;
-  for (std::size_t file = parent;; file = files_[file].parent) {
-    if (std::filesystem::equivalent(files_[file].path, path))
-      fail(include, fmt::format("<include>: {} includes itself", path.string()));
-    if (file == 0) break;
-  }
-  files_.push_back({path, readXmlText(path), parent, {}});
-  files_.back().lines = indexLines(files_.back().text);
+std::size_t SceneFile::addFile(const std::filesystem::path& path, std::size_t parent) {
+  File file{path, readXmlText(path), parent, {}};
+  file.lines = indexLines(file.text);
+  const std::size_t begin = files_.empty() ? 0 : segments_.back().begin + files_.back().text.size() + 1;
+  segments_.push_back({begin, files_.size(), 0});
+  files_.push_back(std::move(file));
   return files_.size() - 1;
 }
 
-/// The range of the content of the file's <scene> in its text.
-TextRange SceneFile::bodyOf(std::size_t file) const {
-  const std::string& text = files_[file].text;
-  pugi::xml_document document;
-  ParseFault fault;
-  const pugi::xml_node scene = sceneIn(
-      document, document.load_buffer(text.data(), text.size(), pugi::parse_default, pugi::encoding_utf8), fault);
-  if (!scene) throw SceneError(placeIn(files_[file].path, text, fault.offset), fault.message);
-  return bodyOfScene(text, static_cast<std::size_t>(location(scene)));
+/// The file of an <include> in the file `around`.
+std::size_t SceneFile::addIncluded(pugi::xml_node include, std::size_t around) {
+  const std::ptrdiff_t at = startOf(around) + location(include);
+  const pugi::xml_attribute name = include.attribute("filename");
+  if (!name) fail(at, "<include> needs a filename");
+  if (files_.size() > kMostIncludes) fail(at, fmt::format("more than {} <include>s", kMostIncludes));
+  const std::filesystem::path path = resolve(substituted(name.value(), at), at);
+  if (!std::filesystem::is_regular_file(path)) fail(at, fmt::format("<include>: no file {}", path.string()));
+  for (std::size_t file = around;; file = files_[file].parent) {
+    if (std::filesystem::equivalent(files_[file].path, path))
+      fail(at, fmt::format("<include>: {} includes itself", path.string()));
+    if (file == 0) break;
+  }
+  included_ += std::filesystem::file_size(path);
+  if (files_[0].text.size() + included_ > kLongestText)
+    fail(at, fmt::format("the file with all included files is longer than {} bytes", kLongestText));
+  return addFile(path, around);
 }
 
-/// Replaces the range [begin, end), which must be in one segment, by a part of a file.
-void SceneFile::splice(std::size_t begin, std::size_t end, const Part& part) {
-  const std::size_t length = part.range.end - part.range.begin;
-  const Segment around = segmentAt(begin);
-  std::vector<Segment> segments;
-  for (const Segment& segment : segments_)
-    if (segment.begin < begin) segments.push_back(segment);
-  if (length > 0) segments.push_back({begin, part.file, part.range.begin});
-  segments.push_back({begin + length, around.file, around.offset + (end - around.begin)});
-  for (const Segment& segment : segments_)
-    if (segment.begin >= end) segments.push_back({segment.begin - end + begin + length, segment.file, segment.offset});
-  segments_ = std::move(segments);
-  text_.replace(begin, end - begin, files_[part.file].text, part.range.begin, length);
+/// Parses a file before its <include>s are replaced. Throws SceneError.
+pugi::xml_node SceneFile::parseAlone(std::size_t file, pugi::xml_document& document) const {
+  ParseFault fault;
+  const pugi::xml_node scene = sceneIn(document, files_[file].text, fault);
+  if (!scene) fail(startOf(file) + static_cast<std::ptrdiff_t>(fault.offset), fault.message);
+  return scene;
+}
+
+/// Reads the definitions of a file, and appends this range of its text, with its <include>s replaced.
+void SceneFile::expand(std::size_t file, pugi::xml_node scene, TextRange range, Expansion& result) {
+  readDefaults(scene, startOf(file));
+  readFolders(scene, startOf(file));
+  for (const pugi::xml_node include : scene.children("include")) {
+    const TextRange element = rangeOfInclude(files_[file].text, static_cast<std::size_t>(location(include)));
+    append(file, {range.begin, element.begin}, result);
+    range.begin = element.end;
+    expandInclude(include, file, result);
+  }
+  append(file, range, result);
+}
+
+/// Appends the content of the file that is included in the file `around`. If it cannot be read, adds a fault instead.
+void SceneFile::expandInclude(pugi::xml_node include, std::size_t around, Expansion& result) {
+  throwIfCancelled();
+  pugi::xml_document document;
+  pugi::xml_node scene;
+  std::size_t file = 0;
+  try {
+    file = addIncluded(include, around);
+    scene = parseAlone(file, document);
+  } catch (const SceneError& error) {
+    for (const Fault& fault : error.faults())
+      findings_.fault(fault.where, fault.message, fault.message, "the included file is left out");
+    return;
+  }
+  expand(file, scene, bodyOfScene(files_[file].text, static_cast<std::size_t>(location(scene))), result);
+}
+
+void SceneFile::append(std::size_t file, TextRange range, Expansion& result) const {
+  if (range.begin == range.end) return;
+  result.segments.push_back({result.text.size(), file, range.begin});
+  result.text.append(files_[file].text, range.begin, range.end - range.begin);
 }
 
 const SceneFile::Segment& SceneFile::segmentAt(std::size_t offset) const {
@@ -267,12 +288,13 @@ void SceneFile::substitute(pugi::xml_node node) {
   if (std::string_view(node.name()) == "default") return;
   throwIfCancelled();
   for (pugi::xml_attribute attribute : node.attributes())
-    if (std::strchr(attribute.value(), '$')) attribute.set_value(substituted(attribute.value(), node).c_str());
+    if (std::strchr(attribute.value(), '$'))
+      attribute.set_value(substituted(attribute.value(), location(node)).c_str());
   for (const pugi::xml_node child : node.children())
     if (child.type() == pugi::node_element) substitute(child);
 }
 
-std::string SceneFile::substituted(const std::string& text, pugi::xml_node node) {
+std::string SceneFile::substituted(const std::string& text, std::ptrdiff_t location) {
   std::string result;
   for (std::size_t i = 0; i < text.size();) {
     if (text[i] != '$') {
@@ -284,19 +306,19 @@ std::string SceneFile::substituted(const std::string& text, pugi::xml_node node)
     const std::string name = text.substr(i + 1, end - i - 1);
     const auto it = values_.find(name);
     if (it == values_.end())
-      fault(node,
+      fault(location,
             fmt::format("${} is not defined: neither by a <default> nor by -D{}", name,
                         values_.empty() ? "" : fmt::format("; defined are {}", listed(values_))),
             "the element is left out");
     result += it == values_.end() ? "$" + name : it->second;
     if (result.size() > kLongestValue)
-      fail(node, fmt::format("with its $names replaced, a value is longer than {} characters", kLongestValue));
+      fail(location, fmt::format("with its $names replaced, a value is longer than {} characters", kLongestValue));
     usedNames_.insert(name);
     i = end;
   }
   substituted_ += result.size();
   if (substituted_ > kLongestText)
-    fail(node, fmt::format("with all $names replaced, the values are longer than {} characters", kLongestText));
+    fail(location, fmt::format("with all $names replaced, the values are longer than {} characters", kLongestText));
   return result;
 }
 
@@ -321,7 +343,7 @@ void SceneFile::indexIds(pugi::xml_node node) {
     if (!id.empty() && name != "ref" && name != "alias") {
       const auto [it, isNew] = ids_.emplace(id, child);
       if (!isNew)
-        fault(child,
+        fault(location(child),
               fmt::format("the id \"{}\" is already used by the <{}> at {}", id, it->second.name(), where(it->second)),
               "the first element keeps it");
     }
@@ -334,11 +356,11 @@ void SceneFile::indexAliases() {
     const std::string id = node.attribute("id").value(), as = node.attribute("as").value();
     const std::string consequence = "the alias is ignored";
     if (id.empty() || as.empty())
-      fault(node, "<alias> needs the attributes id and as", consequence);
+      fault(location(node), "<alias> needs the attributes id and as", consequence);
     else if (!byId(id))
-      fault(node, fmt::format("there is no element with the id \"{}\"", id), consequence);
+      fault(location(node), fmt::format("there is no element with the id \"{}\"", id), consequence);
     else if (!ids_.emplace(as, byId(id)).second)
-      fault(node, fmt::format("the id \"{}\" is already used", as), consequence);
+      fault(location(node), fmt::format("the id \"{}\" is already used", as), consequence);
   }
 }
 

@@ -6,6 +6,7 @@
 // file.
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <set>
@@ -79,37 +80,42 @@ class SceneFile {
     std::size_t begin, file, offset;
   };
 
-  struct Part {
-    std::size_t file;
-    TextRange range;
+  /// The text of all files, as far as their <include>s have been replaced.
+  struct Expansion {
+    std::string text;
+    std::vector<Segment> segments;
   };
 
   std::filesystem::path find(const std::string& name, std::ptrdiff_t location) const;
-  void fault(pugi::xml_node node, const std::string& message, const std::string& consequence);
+  void fault(std::ptrdiff_t location, const std::string& message, const std::string& consequence);
   void parse();
   void checkDepth() const;
-  void readDefaults();
-  void readFolders();
-  bool expandInclude();
-  std::size_t addFile(pugi::xml_node include);
-  TextRange bodyOf(std::size_t file) const;
-  void splice(std::size_t begin, std::size_t end, const Part& part);
+  void readDefaults(pugi::xml_node scene, std::ptrdiff_t start);
+  void readFolders(pugi::xml_node scene, std::ptrdiff_t start);
+  std::size_t addFile(const std::filesystem::path& path, std::size_t parent);
+  std::size_t addIncluded(pugi::xml_node include, std::size_t around);
+  pugi::xml_node parseAlone(std::size_t file, pugi::xml_document& document) const;
+  void expand(std::size_t file, pugi::xml_node scene, TextRange range, Expansion& result);
+  void expandInclude(pugi::xml_node include, std::size_t around, Expansion& result);
+  void append(std::size_t file, TextRange range, Expansion& result) const;
+  std::ptrdiff_t startOf(std::size_t file) const { return static_cast<std::ptrdiff_t>(segments_[file].begin); }
   const Segment& segmentAt(std::size_t offset) const;
   void substitute(pugi::xml_node node);
-  std::string substituted(const std::string& text, pugi::xml_node node);
+  std::string substituted(const std::string& text, std::ptrdiff_t location);
   void indexIds(pugi::xml_node node);
   void indexAliases();
 
   Findings& findings_;
   std::vector<File> files_;
   std::string text_;
-  std::vector<Segment> segments_;  // in order; the first begins at 0
+  std::vector<Segment> segments_;  // in order; the first begins at 0. While files are read, each is one segment
   std::vector<std::filesystem::path> folders_;
   pugi::xml_document document_;
   pugi::xml_node scene_;
   std::map<std::string, std::string> values_;
   std::set<std::string> usedNames_;
   std::size_t substituted_ = 0;  // characters of all values with $names
+  std::uintmax_t included_ = 0;  // bytes of all included files, each as often as it is included
   std::map<std::string, pugi::xml_node> ids_;
 };
 

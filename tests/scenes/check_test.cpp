@@ -280,6 +280,32 @@ TEST_CASE("scenes: many faults in a single line take neither much time nor much 
                                          Catch::Contains(", a00009 and 19990 more") && !Catch::Contains("a00010"));
 }
 
+// Parsing the scene again after each of them would take far longer than the time limit of a test.
+TEST_CASE("scenes: many includes in a scene file are replaced in linear time") {
+  constexpr std::size_t kIncludes = 400000;
+  std::string body;
+  for (std::size_t i = 0; i < kIncludes; ++i) body += "<include/>";
+  const SceneCheck found = check(sceneOf(body));
+  REQUIRE(found.faults.size() == 1);
+  CHECK(found.faults[0].count == kIncludes);
+  CHECK_THAT(found.faults[0].text(), Catch::Contains("test.xml:2:1: <include> needs a filename"));
+}
+
+TEST_CASE("scenes: the length of included files is limited in total, also of those that cannot be parsed") {
+  const TestFolder folder;
+  folder.write("broken.xml", std::string(1 << 20, '<'));
+  std::string body;
+  for (int i = 0; i < 300; ++i) body += "<include filename=\"broken.xml\"/>";
+  CHECK_THROWS_WITH(readScene(folder.write("test.xml", sceneOf(body))),
+                    Catch::Contains("the file with all included files is longer than 268435456 bytes"));
+}
+
+TEST_CASE("scenes: the number of folders is limited") {
+  std::string body;
+  for (int i = 0; i <= 1000; ++i) body += "<path value=\"/\"/>";
+  CHECK_THAT(faultOf(body), Catch::Contains("more than 1000 <path>s"));
+}
+
 TEST_CASE("scenes: columns are counted in characters, also at the ends of long lines") {
   for (const int count : {0, 1, 4000, 100000}) {
     std::string line;
