@@ -100,6 +100,11 @@ Instance makeInstance(int group, const Parameters& parameters) {
   return {group, placed};
 }
 
+bool isEmptyMesh(const Shape& shape) {
+  const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry);
+  return mesh && mesh->triangles.empty();
+}
+
 }  // namespace
 
 void ShapeReader::add(pugi::xml_node node) {
@@ -270,12 +275,8 @@ void ShapeReader::readMeshes() {
   });
   for (const Mesh& mesh : meshes_) reportFault(mesh);
   clearInstancesOutOfRange();
-  // From the back, so that the indices of the remaining shapes stay valid.
-  for (std::size_t i = meshes_.size(); i-- > 0;) dropEmpty(meshes_[i]);
-  std::erase_if(context_.scene.shapes, [](const Shape& shape) {
-    const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry);
-    return mesh && mesh->triangles.empty();
-  });
+  for (const Mesh& mesh : meshes_) noteUnusedMaterials(mesh);
+  dropEmpty();
   for (Shape& shape : context_.scene.shapes)
     if (shape.emitter) dropDuplicates(shape);
 }
@@ -321,16 +322,17 @@ void ShapeReader::clearInstancesOutOfRange() {
   }
 }
 
-void ShapeReader::dropEmpty(const Mesh& mesh) {
-  for (std::size_t i = mesh.shapes.size(); i-- > 0;) {
-    std::vector<Shape>& shapes = shapesOf(mesh.shapes[i].group);
-    const auto shape = shapes.begin() + static_cast<std::ptrdiff_t>(mesh.shapes[i].index);
-    if (!std::get<TriangleMesh>(shape->geometry).triangles.empty()) continue;
-    if (mesh.fault.empty() && i < mesh.source.obj.materials.size())
+void ShapeReader::noteUnusedMaterials(const Mesh& mesh) {
+  if (!mesh.fault.empty()) return;
+  for (std::size_t i = 0; i < mesh.source.obj.materials.size(); ++i)
+    if (isEmptyMesh(shapesOf(mesh.shapes[i].group)[mesh.shapes[i].index]))
       context_.note(fmt::format("{}: no face has the material \"{}\"", mesh.source.path.filename().string(),
                                 mesh.source.obj.materials[i]));
-    shapes.erase(shape);
-  }
+}
+
+void ShapeReader::dropEmpty() {
+  std::erase_if(context_.scene.shapes, isEmptyMesh);
+  for (ShapeGroup& group : context_.scene.groups) std::erase_if(group.shapes, isEmptyMesh);
 }
 
 }  // namespace lobe

@@ -59,7 +59,9 @@ class ShapeReader {
   /// Reports a fault for each instance whose group is too far away, and clears the instance.
   void clearInstancesOutOfRange();
   void dropDuplicates(Shape& shape);
-  void dropEmpty(const Mesh& mesh);
+  void noteUnusedMaterials(const Mesh& mesh);
+  /// Removes shapes without a triangle, so that the indices of others are not valid any more.
+  void dropEmpty();
 
   ReadContext& context_;
   TextureReader& textures_;

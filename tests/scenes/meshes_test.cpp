@@ -279,3 +279,18 @@ TEST_CASE("scenes: all files that a scene names are known") {
   for (const char* name : {"a.obj", "colours.mtl", "red.tga", "part.xml"})
     CHECK(std::ranges::count(read.files, scene.folder.path() / name) == 1);
 }
+
+// Moving the other shapes for each of them would take far longer than the time limit of a test.
+TEST_CASE("scenes: many shapes without a face are removed in linear time", "[slow]") {
+  constexpr int kEmpty = 400000;
+  const TestFolder folder;
+  folder.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  std::string text = "<bsdf type=\"diffuse\" id=\"a\"/><shape type=\"obj\"><string name=\"filename\" value=\"a.obj\"/>";
+  for (int i = 0; i < kEmpty; ++i) text += fmt::format("<ref name=\"m{}\" id=\"a\"/>", i);
+  text += "</shape>";
+  for (int i = 0; i < kEmpty; ++i) text += "<shape type=\"sphere\"/>";
+  const Scene scene = readScene(folder.write("test.xml", sceneOf(text)));
+  CHECK(scene.shapes.size() == kEmpty + 1);
+  REQUIRE(scene.notes.size() == kEmpty);
+  CHECK(scene.notes.front() == "a.obj: no face has the material \"m0\"");
+}
