@@ -44,7 +44,7 @@ Neighbourhood neighbourhoodOf(const IlluminationRecord& record, const RenderScen
                               const TrainedIllumination& illumination, const FieldOptions& options) {
   const SampleStorageData& particles = dataOf(illumination.particles);
   const std::array<std::span<const Particle>, 2> sources{particles.photons, particles.samples};
-  const float reach = options.unitFraction * scene.tracer.bounds().diagonal().norm();
+  const float reach = options.unitFraction * scene.lights.region().diagonal();
   const ParticleNeighbours neighbours(sources, options.neighbours, reach);
   if (neighbours.empty()) return {};
   return neighbours.around(record.position, record.normal, record.tangent);

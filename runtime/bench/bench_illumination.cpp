@@ -74,7 +74,7 @@ HeldOut makeHeldOut(const RenderScene& scene, const RayCamera& camera, const Opt
   HeldOut heldOut;
   heldOut.receivers = receiversOfPaths(scene, camera, o.receivers, kHeldOutSeed);
   const std::vector<Particle> particles = heldOutParticles(scene, camera, o);
-  const float reach = o.plan.records.unitFraction * scene.tracer.bounds().diagonal().norm();
+  const float reach = o.plan.records.unitFraction * scene.lights.region().diagonal();
   const std::size_t count = heldOut.receivers.size();
   heldOut.particles.resize(count);
   heldOut.light.assign(count, IncidentRadiance({}));

@@ -17,7 +17,7 @@ namespace lobe {
 struct TrainingOptions {
   int components = 8;          ///< Gaussians per record, 1 to 8
   int neighbours = 250;        ///< largest number of particles of each source per record and pass, ≥ 1
-  float unitFraction = 0.02f;  ///< the largest radius ("unit"), as a fraction of the scene's diagonal, in (0, 1]
+  float unitFraction = 0.02f;  ///< the largest radius ("unit"), as a fraction of sceneDiagonal, in (0, 1]
   int reservoir = 500;         ///< largest number of points that each record keeps for refit, ≥ 0
   float klThreshold = 5.0f;    ///< κ: largest parallax within a record's radius, in standard deviations, > 0
 
@@ -27,7 +27,7 @@ struct TrainingOptions {
 
 class IlluminationTrainer {
  public:
-  /// sceneDiagonal: diagonal of the scene's bounding box in world units, > 0. kept: records of an earlier training,
+  /// sceneDiagonal: diagonal of a box around what the camera sees in world units, > 0. kept: records of an earlier training,
   /// which stay as they are; their indices in cache() come first.
   IlluminationTrainer(const TrainingOptions& options, float sceneDiagonal, std::vector<IlluminationRecord> kept = {});
 

@@ -134,8 +134,8 @@ void declareBidirectional(CLI::App& app, Options& options) {
           ->default_str("none");
   options.merging = {
       app.add_option("--merge-radius", job.merge.first,
-                     "Radius of vertex merging of vcm in the first sample, as a fraction of the scene's diagonal; the "
-                     "bias of the picture vanishes with it")
+                     "Radius of vertex merging of vcm in the first sample, as a fraction of the visible region's "
+                     "diagonal; the bias of the picture vanishes with it")
           ->capture_default_str(),
       app.add_option("--merge-alpha", job.merge.alpha,
                      "Reduction of this radius: sample i has the radius times i to the power (alpha - 1)/2")

@@ -23,6 +23,7 @@
 #include "runtime/render/integrators/features.h"
 #include "runtime/render/integrators/renderer.h"
 #include "runtime/render/training/light_learning.h"
+#include "runtime/render/training/visible_region.h"
 #include "runtime/tools/checkpoint.h"
 #include "runtime/tools/exr_options.h"
 #include "runtime/tools/json_text.h"
@@ -175,6 +176,7 @@ void Run::prepare() {
   load_.embree = renderScene_->tracer.buildSeconds();
   camera_.emplace(scene_->camera, scene_->filter);
   const Stopwatch learning;
+  renderScene_->lights.focus(visibleRegion(*renderScene_, *camera_, job_.seed));
   renderScene_->lights.use(learnLightCells(*renderScene_, *camera_, job_.seed));
   guiding_.secondsLights = learning.seconds();
   if (job_.gradients)

@@ -182,8 +182,7 @@ std::unique_ptr<BidirectionalGradientIntegrator> makeBdptGradients(const RenderJ
 
 std::unique_ptr<BidirectionalIntegrator> makeVcm(const RenderJob& job, const RenderScene& scene,
                                                  const RayCamera& camera) {
-  const float diagonal = scene.tracer.bounds().isEmpty() ? 1.0f : scene.tracer.bounds().diagonal().norm();
-  const MergeRadius radius{job.merge.first * diagonal, job.merge.alpha};
+  const MergeRadius radius{job.merge.first * scene.lights.region().diagonal(), job.merge.alpha};
   return std::make_unique<VcmIntegrator>(scene, camera, pathOptions(job, scene.scene), radius);
 }
 

@@ -18,7 +18,7 @@ namespace lobe {
 struct FieldOptions {
   static constexpr int kMostComponents = 8;
 
-  float sceneDiagonal = 1;  ///< diagonal of the scene's bounding box in world units, > 0
+  float sceneDiagonal = 1;  ///< diagonal of a box around what the camera sees in world units, > 0
   int components = 8;       ///< Gaussians per record, 1 to kMostComponents
   int neighbours = 250;     ///< largest number of photons, and of camera-path samples, per record and pass, ≥ 1
   /// Largest number of particles of all passes that each record keeps for refit, at 16 bytes each, ≥ 0.

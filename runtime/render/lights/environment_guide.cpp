@@ -27,9 +27,11 @@ int EnvironmentGuide::cellOf(const Vec2& u) {
 }
 
 void EnvironmentGuide::learn(const Vec3& point, const Vec3& wi, float weight) {
+  const std::optional<Vec2> at = lights_.region().coordinates(point, wi);
+  if (!at) return;
   // Few importons leave the scene, so each also contributes to the neighbouring cells. Otherwise the first photons of
   // cells that few importons have reached would outweigh all others.
-  const Vec2 u = lights_.photonCoordinates(point, wi);
+  const Vec2& u = *at;
   const int first = blockOf(wi) * kCells * kCells;
   for (int dy = -1; dy <= 1; ++dy)
     for (int dx = -1; dx <= 1; ++dx) {
@@ -50,11 +52,7 @@ void EnvironmentGuide::update() {
 }
 
 std::optional<EmittedPhoton> EnvironmentGuide::sample(double choice, const Vec2& u1, const Vec2& u2) const {
-  if (!(choice_.total() > 0)) {
-    const std::optional<EnvironmentSample> from = environment_.sample(u1);
-    if (!from) return std::nullopt;
-    return lights_.photonFromEnvironment(*from, u2);
-  }
+  if (!(choice_.total() > 0)) return lights_.photonFromEnvironment(u1, u2);
   const std::size_t chosen = choice_.sample(choice);
   const int bin = bins_[chosen];
   const int index = bin / (kCells * kCells), cell = bin % (kCells * kCells);
@@ -69,18 +67,19 @@ std::optional<EmittedPhoton> EnvironmentGuide::sample(double choice, const Vec2&
   const Vec2 u = ((corner + u2) / kCells).cwiseMin(kOneMinusEpsilon);
   const float pdf = choice_.probability(chosen) * kCells * kCells * from->pdf;
   if (!(pdf > 0)) return std::nullopt;
-  return lights_.photonFromEnvironment({from->wi, from->radiance, pdf}, u);
+  return lights_.photonFromEnvironment({from->wi, from->radiance, pdf}, lights_.region(), u);
 }
 
 float EnvironmentGuide::density(const Vec3& point, const Vec3& wi) const {
-  if (!(choice_.total() > 0)) return environment_.pdf(wi) / lights_.discArea();
+  if (!(choice_.total() > 0)) return lights_.photonDensityOfEnvironment(wi);
+  const std::optional<Vec2> u = lights_.region().coordinates(point, wi);
+  if (!u) return 0;
   const int index = blockOf(wi);
-  const Vec2 u = lights_.photonCoordinates(point, wi);
-  const auto bin = static_cast<std::size_t>(index) * kCells * kCells + static_cast<std::size_t>(cellOf(u));
+  const auto bin = static_cast<std::size_t>(index) * kCells * kCells + static_cast<std::size_t>(cellOf(*u));
   const PixelBlock pixels = block(index);
   if (!(weights_[bin] > 0) || environment_.blockWeight(pixels) <= 0) return 0;
   const double probability = weights_[bin] / choice_.total();
-  return static_cast<float>(probability) * kCells * kCells * environment_.pdf(pixels, wi) / lights_.discArea();
+  return static_cast<float>(probability) * kCells * kCells * environment_.pdf(pixels, wi) / lights_.region().discArea();
 }
 
 }  // namespace lobe

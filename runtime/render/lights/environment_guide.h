@@ -2,11 +2,11 @@
 // Guides the emission of photons from the environment. Without guidance nearly all of them miss what the camera sees,
 // for example a room lit through windows. The guide learns from importons that leave the scene (Vorba et al. 2014).
 //
-// The guide is a histogram over blocks of directions × cells of the disc to which the scene's bounding sphere projects
-// in each direction; within a block, directions are sampled in proportion to the environment's radiance. Photons start
-// only in bins that importons have reached: a photon from elsewhere would have as much weight as hundreds of others.
-// (In the kitchen scene at 16 samples per pixel, the relMSE without the worst 1 % of pixels is 0.403 if a fraction of
-// 0.1 of the photons is sampled from all directions, and 0.395 without.)
+// The guide is a histogram over blocks of directions × cells of the disc to which the bounding sphere of Lights::region
+// projects in each direction; within a block, directions are sampled in proportion to the environment's radiance.
+// Photons start only in bins that importons have reached: a photon from elsewhere would have as much weight as hundreds
+// of others. (In the kitchen scene at 16 samples per pixel, the relMSE without the worst 1 % of pixels is 0.403 if a
+// fraction of 0.1 of the photons is sampled from all directions, and 0.395 without.)
 
 #include <optional>
 #include <vector>
@@ -17,7 +17,7 @@ namespace lobe {
 
 class EnvironmentGuide {
  public:
-  /// The lights must outlive the guide and have an environment.
+  /// The lights must outlive the guide, keep their region, and have an environment.
   explicit EnvironmentGuide(const Lights& lights);
 
   /// Records that a photon travelling along −wi through the point would contribute `weight` to the image.

@@ -68,6 +68,9 @@ LightSample sampleCone(const Sphere& sphere, const Cone& cone, const Vec2& u) {
   return result;
 }
 
+// Upper bound of the number of tiles of the environment.
+constexpr int kMaxTiles = 128;
+
 // Converts a density over surface area to one over solid angle; 0 from behind.
 float toSolidAngle(float areaDensity, float distance2, float cosine) {
   return cosine > 0.0f ? areaDensity * distance2 / cosine : 0.0f;
@@ -80,10 +83,18 @@ Vec3 SceneSphere::start(const Vec3& wi, const Vec2& u) const {
   return centre + Frame::fromNormal(wi).toWorld({d.x(), d.y(), radius});
 }
 
+std::optional<Vec2> SceneSphere::coordinates(const Vec3& point, const Vec3& wi) const {
+  const Vec3 local = Frame::fromNormal(wi).toLocal(point - centre) / radius;
+  const float radial = local.head<2>().squaredNorm();
+  if (!(radial < 1)) return std::nullopt;
+  const float azimuth = std::atan2(local.y(), local.x()) * (0.5f * kInvPi);
+  return Vec2(radial, std::min(azimuth - std::floor(azimuth), kOneMinusEpsilon));
+}
+
 Lights::Lights(const Scene& scene, const Eigen::AlignedBox3f& bounds)
     : scene_(scene), lightOfShape_(scene.shapes.size(), -1) {
   if (!bounds.isEmpty()) {
-    sphere_ = {bounds.center(), 0.5f * bounds.diagonal().norm()};
+    sphere_ = region_ = {bounds.center(), 0.5f * bounds.diagonal().norm()};
   }
   for (std::size_t i = 0; i < scene.shapes.size(); ++i) {
     if (!scene.shapes[i].emitter) continue;
@@ -95,9 +106,21 @@ Lights::Lights(const Scene& scene, const Eigen::AlignedBox3f& bounds)
   if (scene.environment) {
     environment_.emplace(*scene.environment);
     nextEvent_.emplace(EnvironmentLight::forNextEventEstimation(*scene.environment));
+    if (environment_->flux() > 0) nextEvent_->divide(kMaxTiles);
   }
+  makeChoices();
+}
+
+void Lights::focus(const Eigen::AlignedBox3f& region) {
+  region_ = {region.center(), 0.5f * region.diagonal().norm()};
+  makeChoices();
+}
+
+void Lights::makeChoices() {
   const std::vector<double> all = powers();
   choose(all);
+  clusters_.clear();
+  cells_ = {};
   if (!empty()) makeClusters(all);
 }
 
@@ -113,8 +136,8 @@ std::vector<double> Lights::powers() const {
   std::vector<double> all;
   for (const AreaLight& light : areas_)
     all.push_back(static_cast<double>(kPi) * light.area * luminance(light.shape->emitter->radiance->mean()));
-  for (const DeltaLight& light : scene_.lights) all.push_back(powerOf(light, sphere_));
-  if (environment_) all.push_back(environment_->flux() * kPi * sphere_.radius * sphere_.radius);
+  for (const DeltaLight& light : scene_.lights) all.push_back(powerOf(light, region_));
+  if (environment_) all.push_back(environment_->flux() * kPi * region_.radius * region_.radius);
   return all;
 }
 
@@ -141,9 +164,8 @@ void Lights::choose(const std::vector<double>& powers) {
 
 namespace {
 
-/// Upper bounds of the number of clusters of lights at finite distance, and of tiles of the environment.
+/// Upper bound of the number of clusters of lights at finite distance.
 constexpr std::size_t kMaxTreeClusters = 64;
-constexpr int kMaxTiles = 128;
 
 /// The nodes of a tree that divide its lights into at most `most` groups, in the order of the tree. Strong and extended
 /// nodes are divided first.
@@ -242,7 +264,6 @@ void Lights::makeClusters(const std::vector<double>& powers) {
   for (int i = 0; i < localLights; ++i)
     if (powers[i] > 0 && bounds[i].box.isEmpty()) add({.light = i}, {i});
   if (environmentProbability() > 0) {
-    nextEvent_->divide(kMaxTiles);
     for (int tile = 0; tile < nextEvent_->tiles(); ++tile) {
       probabilities.push_back(environmentProbability() * nextEvent_->tileFraction(tile));
       clusters_.push_back({.tile = tile});
@@ -421,7 +442,11 @@ float Lights::photonDensity(const SurfaceHit& hit) const {
 
 float Lights::environmentPhotonDensity(const Vec3& direction) const {
   const float choice = environmentProbability();
-  return choice > 0.0f ? choice * environment_->pdf(direction) / discArea() : 0.0f;
+  return choice > 0.0f ? choice * photonDensityOfEnvironment(direction) : 0.0f;
+}
+
+float Lights::photonDensityOfEnvironment(const Vec3& direction) const {
+  return environment_->pdf(direction) / sphere_.discArea();
 }
 
 float Lights::photonDensity(const LightSample& sample) const {
@@ -431,17 +456,19 @@ float Lights::photonDensity(const LightSample& sample) const {
   return choice / areas_[sample.light].area * std::abs(sample.source->normal.dot(sample.wi)) * kInvPi;
 }
 
-EmittedPhoton Lights::photonFromEnvironment(const EnvironmentSample& from, const Vec2& u) const {
-  const Rgb power = from.radiance * (discArea() / from.pdf);
-  EmittedPhoton photon{{sphere_.start(from.wi, u), -from.wi}, power, true};
-  photon.density = from.pdf / discArea();
+EmittedPhoton Lights::photonFromEnvironment(const EnvironmentSample& from, const SceneSphere& sphere,
+                                            const Vec2& u) const {
+  const Rgb power = from.radiance * (sphere.discArea() / from.pdf);
+  // Photons start `radius` from the centre, and must start outside the scene.
+  const float beyond = std::max(0.0f, (sphere.centre - sphere_.centre).norm() + sphere_.radius - sphere.radius);
+  EmittedPhoton photon{{sphere.start(from.wi, u) + beyond * from.wi, -from.wi}, power, true};
+  photon.density = from.pdf / sphere.discArea();
   return photon;
 }
 
-Vec2 Lights::photonCoordinates(const Vec3& point, const Vec3& wi) const {
-  const Vec3 local = Frame::fromNormal(wi).toLocal(point - sphere_.centre) / sphere_.radius;
-  const float azimuth = std::atan2(local.y(), local.x()) * (0.5f * kInvPi);
-  return Vec2(local.head<2>().squaredNorm(), azimuth - std::floor(azimuth)).cwiseMin(kOneMinusEpsilon);
+std::optional<EmittedPhoton> Lights::photonFromEnvironment(const Vec2& u1, const Vec2& u2) const {
+  const std::optional<EnvironmentSample> from = environment_->sample(u1);
+  return from ? std::optional(photonFromEnvironment(*from, sphere_, u2)) : std::nullopt;
 }
 
 std::optional<EmittedPhoton> Lights::samplePhoton(double choice, const Vec2& u1, const Vec2& u2) const {
@@ -451,8 +478,8 @@ std::optional<EmittedPhoton> Lights::samplePhoton(double choice, const Vec2& u1,
     photon = areaPhoton(areas_[light], choice, u1, u2);
   } else if (const std::size_t delta = light - areas_.size(); delta < scene_.lights.size()) {
     photon = emit(scene_.lights[delta], sphere_, u1, u2);
-  } else if (const std::optional<EnvironmentSample> from = environment_->sample(u1)) {
-    photon = photonFromEnvironment(*from, u2);
+  } else {
+    photon = photonFromEnvironment(u1, u2);
   }
   if (!photon) return std::nullopt;
   photon->power /= choice_.probability(light);

@@ -52,9 +52,13 @@ struct SceneSphere {
   Vec3 centre = Vec3::Zero();
   float radius = 1;
 
-  /// The starting point of a photon from the direction wi: the point for u in [0,1)² on the disc to which the sphere
-  /// projects in that direction.
+  float diagonal() const { return 2 * radius; }
+  /// The area of the disc to which the sphere projects in every direction.
+  float discArea() const { return kPi * radius * radius; }
+  /// The starting point of a photon from the direction wi: the point for u in [0,1)² on the disc in that direction.
   Vec3 start(const Vec3& wi, const Vec2& u) const;
+  /// The u of the photon that travels along −wi through a point; nullopt: it passes beside the disc.
+  std::optional<Vec2> coordinates(const Vec3& point, const Vec3& wi) const;
 };
 
 class Lights;
@@ -125,6 +129,13 @@ class Lights {
   float prior(int cluster) const { return CumulativeProbabilities(prior_.data())[cluster]; }
   /// Estimate of the irradiance from a cluster without occlusion, in units of its own.
   float importance(int cluster, const LightReceiver& at) const;
+  /// Restricts the part of the scene that counts: the environment and directional lights have the power that enters
+  /// this region, so that they do not take all samples from lamps in a room on a large ground plane. The default is the
+  /// bounding box of the scene. Restores the prior probabilities of the clusters.
+  void focus(const Eigen::AlignedBox3f& region);
+  /// The bounding sphere of that region.
+  const SceneSphere& region() const { return region_; }
+
   /// Replaces the probabilities of the clusters by learnt ones; an empty object restores the prior.
   void use(LightCells cells) { cells_ = std::move(cells); }
 
@@ -144,15 +155,13 @@ class Lights {
   /// The same for the photon that travels along −sample.wi from a point that next-event estimation has chosen.
   float photonDensity(const LightSample& sample) const;
 
-  /// A photon from a direction sampled elsewhere (by a learnt density, for example), otherwise as in samplePhoton; its
-  /// power is not divided by the probability of choosing the environment.
-  EmittedPhoton photonFromEnvironment(const EnvironmentSample& from, const Vec2& u) const;
-
-  /// The u for which photonFromEnvironment returns the photon that travels along −wi through a point of the scene.
-  Vec2 photonCoordinates(const Vec3& point, const Vec3& wi) const;
-
-  /// The area of the disc on which photons from infinity start.
-  float discArea() const { return kPi * sphere_.radius * sphere_.radius; }
+  /// A photon from a direction sampled elsewhere (by a learnt density, for example) that starts on the disc of
+  /// `sphere`, outside the scene; its power is not divided by the probability of choosing the environment.
+  EmittedPhoton photonFromEnvironment(const EnvironmentSample& from, const SceneSphere& sphere, const Vec2& u) const;
+  /// As samplePhoton, with the choice of the environment made.
+  std::optional<EmittedPhoton> photonFromEnvironment(const Vec2& u1, const Vec2& u2) const;
+  /// EmittedPhoton::density of that photon if it travels along −direction.
+  float photonDensityOfEnvironment(const Vec3& direction) const;
 
   const EnvironmentLight* environment() const { return environment_ ? &*environment_ : nullptr; }
   /// The probability with which samplePhoton chooses the environment.
@@ -182,6 +191,7 @@ class Lights {
   static float pdfOfArea(const AreaLight& light, const Vec3& point, float distance2, float cosine);
 
   AreaLight areaLight(const Shape& shape) const;
+  void makeChoices();
   std::vector<double> powers() const;
   void choose(const std::vector<double>& powers);
   void makeClusters(const std::vector<double>& powers);
@@ -200,7 +210,8 @@ class Lights {
   };
 
   const Scene& scene_;
-  SceneSphere sphere_;
+  SceneSphere sphere_;  // of the scene's bounding box
+  SceneSphere region_;
   std::vector<AreaLight> areas_;
   std::vector<int> lightOfShape_;  // index into areas_, −1: none
   std::optional<EnvironmentLight> environment_;

@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "runtime/core/parallel.h"
+#include "runtime/render/training/camera_walk.h"
 
 namespace lobe {
 namespace {
@@ -16,10 +17,8 @@ constexpr std::uint64_t kLearningSeed = 0x6c69676874733031;
 constexpr std::int64_t kPixelsPerPath = 4;
 constexpr std::int64_t kLeastPaths = 1 << 12, kMostPaths = 1 << 17;
 constexpr int kChunk = 512;
-constexpr int kMaxDepth = 12;  // segments
 constexpr int kSamplesPerVertex = 2;
-constexpr float kMaxSurvival = 0.95f;
-// Distance of positions that counts as much as orthogonal normals, as a fraction of the scene's diagonal.
+// Distance of positions that counts as much as orthogonal normals, as a fraction of the diagonal of the region.
 constexpr float kNormalLength = 0.2f;
 
 /// Probabilities with which clusters are chosen for the observations.
@@ -30,40 +29,12 @@ struct Exploration {
   const float* at(const LightReceiver& at) const { return cells.empty() ? everywhere.data() : cells.find(at); }
 };
 
-/// A camera path that takes light samples at its vertices.
-class LightWalk {
+/// Takes light samples at the vertices of camera paths.
+class LightObserver {
  public:
-  LightWalk(const RenderScene& scene, const Exploration& exploration, Sampler& rng,
-            std::vector<LightObservation>& result)
+  LightObserver(const RenderScene& scene, const Exploration& exploration, Sampler& rng,
+                std::vector<LightObservation>& result)
       : scene_(scene), exploration_(exploration), rng_(rng), result_(result) {}
-
-  void run(Ray ray) {
-    for (int depth = 1; depth <= kMaxDepth; ++depth) {
-      const std::optional<SurfaceHit> hit = scene_.tracer.trace(ray);
-      if (!hit || !hit->bsdf || !sidesAgree(*hit, hit->woWorld, hit->wo)) return;
-      const float delta = hit->bsdf->deltaProbability(hit->wo, hit->uv);
-      if (delta < 1)
-        for (int i = 0; i < kSamplesPerVertex; ++i) observe(*hit, 1 - delta);
-      const float survival = std::min(kMaxSurvival, hit->bsdf->albedo(hit->wo, hit->uv).maxCoeff());
-      if (!(rng_.uniform() < survival)) return;
-      const std::optional<Vec3> wi = scatter(*hit, delta);
-      if (!wi) return;
-      const Vec3 direction = hit->frame.toWorld(*wi).normalized();
-      if (!sidesAgree(*hit, direction, *wi)) return;
-      ray = spawnRay(*hit, direction);
-    }
-  }
-
- private:
-  std::optional<Vec3> scatter(const SurfaceHit& hit, float delta) {
-    if (delta > 0 && rng_.uniform() < delta) {
-      const std::optional<DeltaSample> sample = sampleDelta(hit, rng_.uniform());
-      return sample ? std::optional(sample->wi) : std::nullopt;
-    }
-    const float choice = rng_.uniform();
-    const std::optional<BsdfSample> sample = sampleBsdf(hit, choice, rng_.uniform2());
-    return sample ? std::optional(sample->wi) : std::nullopt;
-  }
 
   void observe(const SurfaceHit& hit, float smoothFraction) {
     const LightReceiver at = Lights::receiver(hit);
@@ -79,6 +50,7 @@ class LightWalk {
     if (std::isfinite(ratio * ratio)) result_.push_back({at, static_cast<std::uint32_t>(cluster), ratio * ratio});
   }
 
+ private:
   /// The reflected radiance that next-event estimation adds with this sample.
   float contribution(const SurfaceHit& hit, const LightSample& light, float smoothFraction) {
     const Vec3 wi = hit.frame.toLocal(light.wi);
@@ -104,10 +76,11 @@ std::vector<LightObservation> observations(const RenderScene& scene, const RayCa
   parallelFor(0, chunks, [&](int chunk) {
     for (int i = chunk * kChunk; i < std::min(paths, (chunk + 1) * kChunk); ++i) {
       Sampler rng(seed ^ kLearningSeed, round, i);
-      const Vec2 pixel = rng.uniform2();
-      const int x = static_cast<int>(pixel.x() * static_cast<float>(camera.width()));
-      const int y = static_cast<int>(pixel.y() * static_cast<float>(camera.height()));
-      LightWalk(scene, exploration, rng, parts[chunk]).run(camera.sample(x, y, rng));
+      LightObserver observer(scene, exploration, rng, parts[chunk]);
+      walkFromCamera(scene, camera, rng, [&](const SurfaceHit& hit, float delta) {
+        if (delta >= 1) return;
+        for (int k = 0; k < kSamplesPerVertex; ++k) observer.observe(hit, 1 - delta);
+      });
     }
   });
   std::vector<LightObservation> all;
@@ -126,7 +99,7 @@ LightCells learnLightCells(const RenderScene& scene, const RayCamera& camera, st
     exploring.push_back(0.5f * prior.back() + 0.5f / static_cast<float>(lights.clusters()));
   }
   const auto importance = [&](int cluster, const LightReceiver& at) { return lights.importance(cluster, at); };
-  const float length = kNormalLength * scene.tracer.bounds().diagonal().norm();
+  const float length = kNormalLength * lights.region().diagonal();
   const auto pixels = static_cast<std::int64_t>(camera.width()) * camera.height();
   const auto paths = static_cast<int>(std::clamp(pixels / kPixelsPerPath, kLeastPaths, kMostPaths));
   // The second half of the observations is made where the first half has found light.

@@ -115,7 +115,7 @@ class Training {
  private:
   static int fractionOf(int count, double size) { return std::max(1, static_cast<int>(std::lround(size * count))); }
   static FieldOptions inScene(FieldOptions options, const RenderScene& scene) {
-    options.sceneDiagonal = scene.tracer.bounds().diagonal().norm();
+    options.sceneDiagonal = scene.lights.region().diagonal();
     return options;
   }
 
