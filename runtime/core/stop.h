@@ -20,16 +20,17 @@ namespace lobe {
 class CancelOnStop {
  public:
   CancelOnStop(const StopFlag& flag, tbb::task_group_context& context)
-      : thread_([&flag, &context](const std::stop_token& end) {
-          std::mutex mutex;
-          std::condition_variable_any ended;
-          std::unique_lock lock(mutex);
+      : thread_([this, &flag, &context](const std::stop_token& end) {
+          std::unique_lock lock(mutex_);
           while (flag == 0 && !end.stop_requested())
-            ended.wait_for(lock, end, std::chrono::milliseconds(20), [] { return false; });
+            ended_.wait_for(lock, end, std::chrono::milliseconds(20), [] { return false; });
           if (flag != 0) context.cancel_group_execution();
         }) {}
 
  private:
+  // Making these needs memory, so it is not done in the thread, whose exceptions would end the program.
+  std::mutex mutex_;
+  std::condition_variable_any ended_;
   std::jthread thread_;
 };
 
