@@ -21,13 +21,25 @@ std::ifstream openFile(const std::filesystem::path& path);
 /// The content of a regular file. Throws like openFile.
 std::string readFile(const std::filesystem::path& path);
 
-/// Returns the result of read(). Exceptions are converted to std::runtime_error with the name of the file prepended.
+/// Too little memory for reading a file. It is no std::runtime_error, so that code which tolerates faulty files does
+/// not tolerate this: the file may be sound.
+class OutOfMemory : public std::bad_alloc {
+ public:
+  explicit OutOfMemory(const std::filesystem::path& path) : message_(path.string() + ": not enough memory") {}
+  const char* what() const noexcept override { return message_.what(); }
+
+ private:
+  std::runtime_error message_;  // unlike a std::string, it can be copied without memory
+};
+
+/// Returns the result of read(). Exceptions are converted to std::runtime_error with the name of the file prepended,
+/// but std::bad_alloc to OutOfMemory.
 template <class Read>
 auto nameErrors(const std::filesystem::path& path, Read&& read) {
   try {
     return read();
   } catch (const std::bad_alloc&) {
-    throw std::runtime_error(fmt::format("{}: not enough memory", path.string()));
+    throw OutOfMemory(path);
   } catch (const std::exception& e) {
     throw std::runtime_error(fmt::format("{}: {}", path.string(), e.what()));
   }

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <exception>
 #include <iterator>
+#include <new>
 #include <optional>
 
 #include <fmt/format.h>
@@ -128,6 +129,9 @@ bool attempt(const CompileJob& job, Progress& progress, CacheReport& report, std
   try {
     report = compileOne(job, progress);
     return true;
+  } catch (const std::bad_alloc&) {
+    fault = job.path.string() + ": not enough memory";
+    return false;
   } catch (const std::exception& error) {
     fault = error.what();
     return false;

@@ -19,6 +19,7 @@
 #include <CLI/CLI.hpp>
 
 #include "runtime/core/atomic_file.h"
+#include "runtime/core/files.h"
 
 namespace lobe {
 namespace {
@@ -132,14 +133,22 @@ void takeRenamed(const std::string& tool, const RenamedOption& option, std::vect
   }
 }
 
-/// --help and --version.
-int printHelp(const std::string& name, const CLI::App& app, const CLI::Success& request) {
-  app.exit(request);
+/// Declares the options and parses the arguments. Returns false after --help and --version, which print a text.
+bool parse(CLI::App& app, const std::string& name, int argc, char** argv, const std::function<void(CLI::App&)>& declare,
+           const std::vector<RenamedOption>& renamed) {
+  app.option_defaults()->always_capture_default();
+  app.set_version_flag("--version", name + " " LOBE_VERSION);
+  declare(app);
+  std::vector<std::string> arguments(argv + std::min(argc, 1), argv + argc);
+  for (const RenamedOption& option : renamed) takeRenamed(name, option, arguments);
+  std::ranges::reverse(arguments);  // CLI11 expects the arguments in reverse order
   try {
+    app.parse(arguments);
+    return true;
+  } catch (const CLI::Success& request) {
+    app.exit(request);
     flushOutput();
-    return 0;
-  } catch (const std::system_error& e) {
-    return e.code() == std::errc::broken_pipe ? endWithReader() : fail(name, e.what(), 1);
+    return false;
   }
 }
 
@@ -160,26 +169,18 @@ const StopFlag& stopOnSignals() {
   return stopSignal;
 }
 
-int runTool(const std::string& name, const std::string& description, int argc, char** argv,
+int runTool(const std::string& name, std::string_view description, int argc, char** argv,
             const std::function<void(CLI::App&)>& declare, const std::function<void()>& work,
             const std::vector<RenamedOption>& renamed) {
   openClosedStreams();
   ignoreSignalsOfWrites();
   deferSignalsWhileWriting();
-  CLI::App app(description, name);
   try {
-    app.option_defaults()->always_capture_default();
-    app.set_version_flag("--version", name + " " LOBE_VERSION);
-    declare(app);
-    std::vector<std::string> arguments(argv + std::min(argc, 1), argv + argc);
-    for (const RenamedOption& option : renamed) takeRenamed(name, option, arguments);
-    std::ranges::reverse(arguments);  // CLI11 expects the arguments in reverse order
-    app.parse(arguments);
+    CLI::App app(std::string(description), name);
+    if (!parse(app, name, argc, argv, declare, renamed)) return 0;
     work();
     flushOutput();
     return 0;
-  } catch (const CLI::Success& e) {
-    return printHelp(name, app, e);
   } catch (const CLI::ParseError& e) {
     return fail(name, asOneLine(fmt::format("{} (see {} --help)", e.what(), name)), 2);
   } catch (const UsageError& e) {
@@ -187,6 +188,8 @@ int runTool(const std::string& name, const std::string& description, int argc, c
   } catch (const Stopped& e) {
     printDiagnostic(fmt::format("{}: interrupted: {}\n", name, e.what()));
     return 128 + stopSignal;
+  } catch (const OutOfMemory& e) {
+    return fail(name, e.what(), 1);
   } catch (const std::bad_alloc&) {
     return fail(name, "out of memory", 1);
   } catch (const std::system_error& e) {

@@ -37,7 +37,7 @@ struct RenamedOption {
 /// success (also after --help and --version); 1 if work throws; 2 if parsing fails or anything throws UsageError.
 /// Errors go to stderr, with "NAME: error: " before each line of the message. Renamed options are accepted with a note.
 /// If work throws Stopped, its message is printed and the result is 128 plus the number of the signal.
-int runTool(const std::string& name, const std::string& description, int argc, char** argv,
+int runTool(const std::string& name, std::string_view description, int argc, char** argv,
             const std::function<void(CLI::App&)>& declare, const std::function<void()>& work,
             const std::vector<RenamedOption>& renamed = {});
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <exception>
+#include <new>
 
 #include <fmt/format.h>
 
@@ -111,6 +112,8 @@ ImageStore::Entry ImageStore::read(const ImageRequest& request) {
   try {
     Image image = request.alpha ? readAlpha(request.path) : readImage(request.path, request.encoding);
     return {std::make_shared<const Image>(std::move(image)), ""};
+  } catch (const std::bad_alloc&) {
+    throw;  // no fault of the file, so lenient reading must not go on without it
   } catch (const std::exception& error) {
     return {nullptr, error.what()};
   }

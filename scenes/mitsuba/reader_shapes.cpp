@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <exception>
+#include <new>
 
 #include <fmt/format.h>
 
@@ -295,6 +296,8 @@ void ShapeReader::read(Mesh& mesh) {
     std::vector<TriangleMesh> parts = lobe::readMeshes(mesh.source, mesh.options);
     for (std::size_t i = 0; i < parts.size(); ++i)
       shapesOf(mesh.shapes[i].group)[mesh.shapes[i].index].geometry = std::move(parts[i]);
+  } catch (const std::bad_alloc&) {
+    throw;  // no fault of the file, so lenient reading must not go on without the mesh
   } catch (const std::exception& error) {
     mesh.fault = error.what();
   }
