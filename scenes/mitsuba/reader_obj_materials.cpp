@@ -22,7 +22,7 @@ bool isThere(const std::filesystem::path& path) {
 
 std::vector<std::pair<std::string, int>> ObjMaterialReader::read(pugi::xml_node shape, std::ptrdiff_t location,
                                                                  const MeshSource& source) {
-  const ObjMaterials found = find(source);
+  const ObjMaterials found = find(location, source);
   if (found.library.empty()) return {};
   Place place{shape, location, source.path.parent_path(), {}};
   place.library = resolve(place, found.library);
@@ -36,13 +36,19 @@ std::vector<std::pair<std::string, int>> ObjMaterialReader::read(pugi::xml_node 
   return result;
 }
 
-ObjMaterials ObjMaterialReader::find(const MeshSource& source) const {
+ObjMaterials ObjMaterialReader::find(std::ptrdiff_t location, const MeshSource& source) const {
+  const std::string text = textOf(location, source.path, "shape \"obj\"");
+  ObjMaterials found = findObjMaterials(text, source.obj.mesh);
+  if (source.obj.grouping == ObjGrouping::collapsed) found.names = {found.last};
+  return found;
+}
+
+std::string ObjMaterialReader::textOf(std::ptrdiff_t location, const std::filesystem::path& path,
+                                      const std::string& what) const {
   try {
-    ObjMaterials found = findObjMaterials(readFile(source.path), source.obj.mesh);
-    if (source.obj.grouping == ObjGrouping::collapsed) found.names = {found.last};
-    return found;
-  } catch (const std::runtime_error&) {
-    return {};  // reported when the mesh is read
+    return nameErrors(path, [&] { return readFile(path); });
+  } catch (const std::runtime_error& error) {
+    context_.file.fail(location, fmt::format("{}: {}", what, error.what()));
   }
 }
 
@@ -61,22 +67,32 @@ std::filesystem::path ObjMaterialReader::resolve(const Place& place, std::string
 }
 
 const ObjMaterialReader::Library& ObjMaterialReader::library(const Place& place) {
-  const auto [entry, isNew] = libraries_.try_emplace(place.library);
-  if (!isNew) return entry->second;
+  if (const auto known = libraries_.find(place.library); known != libraries_.end()) return known->second;
+  return libraries_.emplace(place.library, readLibrary(place)).first->second;
+}
+
+ObjMaterialReader::Library ObjMaterialReader::readLibrary(const Place& place) const {
+  const std::string what = fmt::format("{}: material library", describe(place.shape));
+  Library library;
   try {
-    for (MtlMaterial& material : nameErrors(place.library, [&] { return parseMtl(readFile(place.library)); }))
-      entry->second[material.name] = std::move(material);
+    if (!isThere(place.library)) throw std::runtime_error(place.library.string() + ": no such file");
+    const std::string text = textOf(place.location, place.library, what);
+    for (MtlMaterial& material : nameErrors(place.library, [&] { return parseMtl(text); }))
+      library[material.name] = std::move(material);
+  } catch (const SceneError&) {
+    throw;
   } catch (const std::runtime_error& error) {
     context_.warn(place.location, fmt::format("material library {}", place.library.string()),
-                  fmt::format("{}: material library: {}: diffuse 0.5 is used", describe(place.shape), error.what()));
+                  fmt::format("{}: {}: diffuse 0.5 is used", what, error.what()));
   }
-  return entry->second;
+  return library;
 }
 
 int ObjMaterialReader::use(const Place& place, const MtlMaterial& material) {
-  const auto [entry, isNew] = used_.try_emplace({place.library, material.name});
-  if (isNew) entry->second = materials_.add(material.name, make(place, material));
-  return entry->second;
+  const std::pair key(place.library, material.name);
+  if (const auto known = used_.find(key); known != used_.end()) return known->second;
+  const int index = materials_.add(material.name, make(place, material));
+  return used_.emplace(key, index).first->second;
 }
 
 MaterialReader::Made ObjMaterialReader::make(const Place& place, const MtlMaterial& material) {

@@ -19,8 +19,8 @@ class ObjMaterialReader {
       : context_(context), textures_(textures), materials_(materials) {}
 
   /// Names and indices in Scene::materials of the library's materials for the OBJ's selected faces, except those whose
-  /// names the selection contains already. A missing library or image causes a warning at the location, which is that
-  /// of the OBJ's file name in the shape. An OBJ that cannot be read has no materials.
+  /// names the selection contains already. A missing or malformed library and a missing image cause a warning at the
+  /// location, which is that of the OBJ's file name in the shape. Throws SceneError if a file cannot be read.
   std::vector<std::pair<std::string, int>> read(pugi::xml_node shape, std::ptrdiff_t location,
                                                 const MeshSource& source);
 
@@ -33,13 +33,16 @@ class ObjMaterialReader {
     std::filesystem::path library;  ///< empty if there is none
   };
 
-  ObjMaterials find(const MeshSource& source) const;
+  ObjMaterials find(std::ptrdiff_t location, const MeshSource& source) const;
+  /// The content of a file. what: of the message of the SceneError that is thrown if it cannot be read.
+  std::string textOf(std::ptrdiff_t location, const std::filesystem::path& path, const std::string& what) const;
   /// Path of a file that the OBJ or its library names: in the folder of the OBJ, or where files of the scene are
   /// searched.
   std::filesystem::path resolve(const Place& place, std::string name) const;
   /// By name. If several materials have the same name, the last one is used.
   using Library = std::map<std::string, MtlMaterial>;
   const Library& library(const Place& place);
+  Library readLibrary(const Place& place) const;
   int use(const Place& place, const MtlMaterial& material);
   MaterialReader::Made make(const Place& place, const MtlMaterial& material);
   MaterialReader::Made makeModel(const Place& place, const MtlMaterial& material);

@@ -219,6 +219,21 @@ TEST_CASE("scenes: a missing or malformed library causes a warning") {
   CHECK_THAT(damaged.warnings[0], Contains("colours.mtl: line 2: \"one\" is not a number"));
 }
 
+TEST_CASE("scenes: a library that exists but cannot be read is a fault") {
+  const ObjScene files("");
+  std::filesystem::create_directory(files.folder.path() / "colours.mtl");
+  CHECK_THROWS_WITH(files.read(), Contains("test.xml:2:19: ") && Contains("colours.mtl: is a folder, not a file"));
+}
+
+TEST_CASE("scenes: lenient reading leaves out every shape whose material has a damaged image") {
+  const ObjScene files("newmtl red\nmap_Kd broken.png\n",
+                       "mtllib colours.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n");
+  files.folder.write("broken.png", "not a picture");
+  const std::string obj = "<shape type=\"obj\"><string name=\"filename\" value=\"a.obj\"/></shape>";
+  const std::string text = "<scene version=\"0.6.0\"><shape type=\"sphere\"/>" + obj + obj + kSensor + "</scene>";
+  CHECK(readScene(files.folder.write("test.xml", text), lenient()).shapes.size() == 1);
+}
+
 TEST_CASE("scenes: maxSmoothAngle is read and excludes flat faces") {
   const std::string folded = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 0 1 1\nf 1 2 3 4\nf 5 1 4 6\n";
   const ObjScene files("", folded);
