@@ -170,8 +170,10 @@ std::optional<Image> readExr(const std::filesystem::path& path, const NamesOf& n
   try {
     return readExrPixels(path, namesOf);
   } catch (const std::bad_alloc&) {
-    fail(path, "not enough memory to read the image");
+    throw OutOfMemory(path);
   } catch (const Iex::BaseExc& e) {
+    // OpenEXR keeps only the text of exceptions in its tasks.
+    if (std::string_view(e.what()).find("bad_alloc") != std::string_view::npos) throw OutOfMemory(path);
     fail(path, fmt::format("damaged EXR file ({})", e.what()));
   }
 }
@@ -301,16 +303,10 @@ Image readOther(const std::filesystem::path& path, const Encoding& encoding, Par
   return loadPixels(path, bytes, encoding, part);
 }
 
-bool startsLikeExr(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  char magic[4] = {};
-  return file.read(magic, 4) && Imf::isImfMagic(magic);
-}
-
 Image readPart(const std::filesystem::path& path, const Encoding& encoding, Part part) {
   if (!std::filesystem::exists(path)) fail(path, "no such file");
   if (!std::filesystem::is_regular_file(path)) fail(path, "not a file");
-  if (!startsLikeExr(path)) return readOther(path, encoding, part);
+  if (!isExrFile(path)) return readOther(path, encoding, part);
   return *readExr(path,
                   [&](const Imf::ChannelList& channels) { return std::optional(exrChannels(path, channels, part)); });
 }
@@ -322,6 +318,16 @@ void addTo(Fingerprint& hash, const Image& image) {
   hash.array(std::span<const Rgb>(image.pixels));
 }
 
+bool isExrFile(const std::filesystem::path& path) {
+  return nameErrors(path, [&] {
+    std::ifstream file = openFile(path);
+    char magic[4] = {};
+    const bool complete = static_cast<bool>(file.read(magic, sizeof(magic)));
+    if (file.bad()) throw std::runtime_error("cannot read");
+    return complete && Imf::isImfMagic(magic);
+  });
+}
+
 Image readImage(const std::filesystem::path& path, Encoding encoding) {
   return readPart(path, encoding, Part::colours);
 }
@@ -331,7 +337,7 @@ Image readAlpha(const std::filesystem::path& path) {
 }
 
 std::optional<Image> readChannels(const std::filesystem::path& path, const std::array<std::string, 3>& names) {
-  if (!startsLikeExr(path)) return std::nullopt;
+  if (!isExrFile(path)) return std::nullopt;
   return readExr(path, [&](const Imf::ChannelList& channels) {
     const bool complete =
         std::ranges::all_of(names, [&](const std::string& name) { return channels.findChannel(name); });

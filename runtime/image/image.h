@@ -36,6 +36,10 @@ struct Encoding {
   float exponent = 1.0f;
 };
 
+/// Whether the content of the file is that of an EXR file, whatever its name. Throws std::runtime_error that names the
+/// file if it is not a regular file or cannot be read.
+bool isExrFile(const std::filesystem::path& path);
+
 /// Reads PNG (png_file.h), JPEG (jpeg_file.h), BMP, TGA (stb_image), HDR (rgbe_file.h) and EXR (OpenEXR; R, G, B or a
 /// single luminance channel Y). The image of an EXR file is the display window, black outside the data window.
 /// Floating-point data are linear whatever the encoding. Alpha is discarded. Throws std::runtime_error that names the

@@ -3,7 +3,9 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <exception>
 #include <list>
+#include <new>
 #include <stdexcept>
 
 #include <ImfChannelList.h>
@@ -14,7 +16,6 @@
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfStringAttribute.h>
-#include <ImfTestFile.h>
 #include <fmt/format.h>
 #include <half.h>
 
@@ -138,10 +139,21 @@ std::size_t encodeExr(Imf::OStream& stream, const Image& image, const ImageAttri
   return channels.clamped();
 }
 
-void appendBytes(void* context, void* data, int size) {
-  auto& bytes = *static_cast<std::vector<std::byte>*>(context);
-  const auto* first = static_cast<const std::byte*>(data);
-  bytes.insert(bytes.end(), first, first + size);
+/// The bytes of a PNG file, or why there are none.
+struct PngBytes {
+  std::vector<std::byte> bytes;
+  std::exception_ptr failure;
+};
+
+/// Exceptions must not pass through stb_image_write, which would not release its memory.
+void takeBytes(void* context, void* data, int size) {
+  auto& png = *static_cast<PngBytes*>(context);
+  try {
+    const auto* first = static_cast<const std::byte*>(data);
+    png.bytes.assign(first, first + size);
+  } catch (const std::bad_alloc&) {
+    png.failure = std::current_exception();
+  }
 }
 
 }  // namespace
@@ -158,10 +170,11 @@ bool isExrName(const std::filesystem::path& path) {
 }
 
 void writePng(const std::filesystem::path& path, int width, int height, const std::vector<std::uint8_t>& rgb) {
-  std::vector<std::byte> bytes;
-  if (width < 1 || height < 1 || !stbi_write_png_to_func(appendBytes, &bytes, width, height, 3, rgb.data(), 3 * width))
+  PngBytes png;
+  if (width < 1 || height < 1 || !stbi_write_png_to_func(takeBytes, &png, width, height, 3, rgb.data(), 3 * width))
     throw std::runtime_error(fmt::format("{}: the image cannot be encoded as PNG", path.string()));
-  writeAtomically(path, std::span<const std::byte>(bytes));
+  if (png.failure) std::rethrow_exception(png.failure);
+  writeAtomically(path, std::span<const std::byte>(png.bytes));
 }
 
 std::size_t writeImage(const std::filesystem::path& path, const Image& image, const ImageAttributes& attributes,
@@ -179,9 +192,8 @@ std::size_t writeImage(const std::filesystem::path& path, const Image& image, co
 
 ImageAttributes readAttributes(const std::filesystem::path& path) {
   ImageAttributes attributes;
-  nameErrors(path, [&] { openFile(path); });  // refuses a pipe, which OpenEXR would wait for
-  if (!Imf::isOpenExrFile(path.c_str())) return attributes;
-  try {
+  if (!isExrFile(path)) return attributes;
+  nameErrors(path, [&] {
     const Imf::InputFile file(path.c_str());
     for (auto entry = file.header().begin(); entry != file.header().end(); ++entry) {
       if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&entry.attribute()))
@@ -189,9 +201,7 @@ ImageAttributes readAttributes(const std::filesystem::path& path) {
       else if (const auto* number = dynamic_cast<const Imf::DoubleAttribute*>(&entry.attribute()))
         attributes[entry.name()] = number->value();
     }
-  } catch (const std::exception& e) {
-    throw std::runtime_error(fmt::format("{}: {}", path.string(), e.what()));
-  }
+  });
   return attributes;
 }
 

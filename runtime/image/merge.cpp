@@ -40,8 +40,10 @@ std::optional<std::uint64_t> findCount(const ImageAttributes& attributes, const 
 std::vector<SampleRange> parseRanges(const std::string& text) {
   std::vector<SampleRange> ranges;
   std::istringstream all(text);
+  all.exceptions(std::ios::badbit);  // otherwise too little memory would look like the end of the text
   for (std::string entry; std::getline(all, entry, ',');) {
     std::istringstream words(entry);
+    words.exceptions(std::ios::badbit);
     SampleRange range;
     std::string rest;
     if (!(words >> range.integrator >> range.seed >> range.first >> range.last) || words >> rest ||

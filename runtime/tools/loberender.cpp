@@ -25,6 +25,7 @@ using namespace lobe;
 std::set<Aov> parseAovs(const std::string& text) {
   std::set<Aov> aovs;
   std::istringstream list(text);
+  list.exceptions(std::ios::badbit);  // otherwise too little memory would look like the end of the list
   for (std::string name; std::getline(list, name, ',');) {
     const auto found = std::ranges::find(kAovNames, name);
     if (name == "all")

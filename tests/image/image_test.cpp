@@ -224,4 +224,5 @@ TEST_CASE("render: channels of exr files are read by name, if there are all of t
   CHECK(!readChannels(folder / "a.exr", {"normal.X", "normal.Y", "normal.W"}));
   writeImage(folder / "a.png", image);
   CHECK(!readChannels(folder / "a.png", {"R", "G", "B"}));
+  CHECK_THROWS_WITH(readChannels(folder / "none.exr", {"R", "G", "B"}), Catch::Contains("none.exr: no such file"));
 }
