@@ -336,7 +336,8 @@ void Run::writePicture(const std::filesystem::path& output, const RunResult& res
   ImageAttributes all = attributes(job_, sceneHash_, result);
   if (gradients_) all["clampedFraction"] = written.clampedFraction;
   Aovs aovs;
-  for (const Aov aov : job_.aovs) aovs.emplace(aov, imageOf(aov));
+  for (const Aov aov : job_.aovs)
+    if (features_ || !isFeature(aov)) aovs.emplace(aov, imageOf(aov));
   noteClamped(kTool, output, writeImage(output, written.image, all, layersOf(aovs), job_.exr));
 }
 
@@ -373,6 +374,11 @@ void Run::finish() {
 void Run::rescue() {
   if (film().sampleRange().second == 0) return;
   printWarning(kTool, "rendering has failed; the outputs are written as they are");
+  try {
+    addFeatures();
+  } catch (const std::exception&) {
+    features_.reset();  // rather no AOVs than those of fewer samples than the picture has
+  }
   writeOutputs(errors_);
   for (const std::string& error : errors_.all()) printWarning(kTool, error);
 }
