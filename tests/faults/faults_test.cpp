@@ -1,127 +1,31 @@
-// Fault injection: the n-th allocation, or the n-th write to a file, fails while a cache is compiled and while a tiny
-// scene is read, trained, rendered and written. Whatever n is, the failure is reported as an exception, nothing is
-// half-written, and a run that reports success has the same bytes as one without faults.
+// Fault injection: whichever allocation, task, write or read fails while a cache is compiled and while a tiny scene is
+// read, trained, rendered and written, the failure is reported as an exception, nothing is half-written, and a run that
+// reports success has the same bytes as one without faults.
 
 #include <atomic>
-#include <cerrno>
-#include <cstdlib>
 #include <filesystem>
-#include <functional>
-#include <new>
-#include <set>
 #include <string>
+#include <variant>
 #include <vector>
-
-#include <fcntl.h>
-#include <sys/syscall.h>
-#include <unistd.h>
 
 #include <catch2/catch.hpp>
 
 #include "fitter/compile.h"
+#include "runtime/core/parallel.h"
+#include "runtime/core/stop.h"
 #include "runtime/image/image.h"
 #include "runtime/image/image_output.h"
 #include "runtime/tools/render_run.h"
 #include "scenes/mitsuba/reader.h"
 #include "scenes/scene_lobes.h"
-#include "schema/checkpoint_file.h"
-#include "schema/illumination_file.h"
+#include "tests/faults/injection.h"
 #include "tests/support/loberender_test_tools.h"
-
-namespace {
-
-/// Calls that are counted while an Injection exists; call number `failing` fails.
-struct Countdown {
-  std::atomic<long> calls = 0, failing = 0;
-  std::atomic<bool> enabled = false;
-
-  bool fails() { return enabled && ++calls == failing; }
-};
-Countdown allocations, writes;
-
-class Injection {
- public:
-  /// failing: number of the call that fails, from 1; 0: none.
-  Injection(Countdown& countdown, long failing) : countdown_(countdown) {
-    countdown.calls = 0;
-    countdown.failing = failing;
-    countdown.enabled = true;
-  }
-  Injection(const Injection&) = delete;
-  Injection& operator=(const Injection&) = delete;
-  ~Injection() { countdown_.enabled = false; }
-
- private:
-  Countdown& countdown_;
-};
-
-void* allocate(std::size_t size, std::size_t alignment) {
-  size = std::max<std::size_t>(size, 1);
-  void* memory = alignment == 0 ? std::malloc(size)
-                                : std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
-  if (!memory || allocations.fails()) {
-    std::free(memory);
-    throw std::bad_alloc();
-  }
-  return memory;
-}
-
-}  // namespace
-
-void* operator new(std::size_t size) {
-  return allocate(size, 0);
-}
-void* operator new(std::size_t size, std::align_val_t alignment) {
-  return allocate(size, static_cast<std::size_t>(alignment));
-}
-void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::align_val_t) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
-  std::free(memory);
-}
-
-// These replace those of the C library for our own code.
-extern "C" ssize_t write(int file, const void* bytes, std::size_t size) {
-  if (writes.fails()) {
-    errno = ENOSPC;
-    return -1;
-  }
-  return ::syscall(SYS_write, file, bytes, size);
-}
-extern "C" int fsync(int file) {
-  if (writes.fails()) {
-    errno = EIO;
-    return -1;
-  }
-  return static_cast<int>(::syscall(SYS_fsync, file));
-}
-extern "C" int rename(const char* from, const char* to) noexcept {
-  if (writes.fails()) {
-    errno = EACCES;
-    return -1;
-  }
-  return static_cast<int>(::syscall(SYS_renameat2, AT_FDCWD, from, AT_FDCWD, to, 0));
-}
 
 namespace {
 
 using namespace lobe;
 using namespace lobe::test;
 namespace fs = std::filesystem;
-
-/// The first calls, and then fewer and fewer up to the last.
-std::vector<long> chosenUpTo(long last) {
-  std::vector<long> chosen;
-  for (long n = 1; n <= last; n += 1 + n / 12) chosen.push_back(n);
-  return chosen;
-}
 
 RenderJob jobIn(const fs::path& folder) {
   RenderJob job;
@@ -131,71 +35,93 @@ RenderJob jobIn(const fs::path& folder) {
   job.outputs = {out / "a.exr", out / "a.png"};
   job.saveIllumination = out / "a.illum";
   job.checkpoint = out / "run.ckpt";
-  job.samples = 2;
+  job.samples = kSamples;
   job.passes = 1;
   job.training.photons = 300;
   job.training.importons = 150;
   return job;
 }
 
-/// Checks that files in the folder are complete, and that there are no others.
-void checkWhole(const fs::path& folder) {
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    const std::string name = entry.path().filename().string();
-    CAPTURE(name);
-    if (name == "a.exr" || name == "a.png")
-      CHECK(readImage(entry.path()).width == 16);
-    else if (name == "a.illum")
-      CHECK(IlluminationFile::open(entry.path()).bytes() > 0);
-    else if (name == "run.ckpt")
-      CHECK(CheckpointFile::open(entry.path()).pixels().size() == 16 * 12);
-    else if (name.ends_with(".lobe"))
-      CHECK(LobeCache::open(entry.path()).bytes() > 0);
-    else
-      CHECK(name == "no other file");
-  }
-}
+/// A kind of render: what it changes in the job of quickJobIn.
+struct Render {
+  const char* name;
+  void (*set)(RenderJob& job);
+};
 
-/// Calls work with an empty output folder for chosen calls that fail, and checks what it leaves. Returns how many calls
-/// failed and were reported.
-int injectInto(Countdown& countdown, const fs::path& out, const std::function<void()>& work,
-               const std::function<std::string()>& result) {
-  const auto again = [&](long failing) {
-    fs::remove_all(out);
-    fs::create_directory(out);
-    try {
-      const Injection injection(countdown, failing);
-      work();
-      return true;
-    } catch (const std::exception&) {
-      return false;
-    }
-  };
-  REQUIRE(again(0));
-  const long calls = countdown.calls;
-  const std::string expected = result();
-  checkWhole(out);
-  int reported = 0;
-  for (const long n : chosenUpTo(calls)) {
-    CAPTURE(n, calls);
-    const bool succeeded = again(n);
-    checkWhole(out);
-    if (succeeded)
-      CHECK(result() == expected);
-    else
-      ++reported;
-  }
-  REQUIRE(again(0));
-  CHECK(result() == expected);
-  return reported;
-}
+const std::vector<Render> kRenders{
+    {"product", [](RenderJob&) {}},
+    {"guided", [](RenderJob& job) { job.integrator = IntegratorKind::guided; }},
+    {"bdpt",
+     [](RenderJob& job) {
+       job.integrator = IntegratorKind::bdpt;
+       job.saveIllumination.clear();
+     }},
+    {"guided bdpt",
+     [](RenderJob& job) {
+       job.integrator = IntegratorKind::bdpt;
+       job.guide = BdptGuide::illumination;
+     }},
+    {"vcm",
+     [](RenderJob& job) {
+       job.integrator = IntegratorKind::vcm;
+       job.saveIllumination.clear();
+     }},
+    {"gradients",
+     [](RenderJob& job) {
+       job.integrator = IntegratorKind::path;
+       job.gradients = ReconstructionNorm::l2;
+       job.saveIllumination.clear();
+       job.checkpoint.clear();
+     }},
+    {"gradients of bdpt",
+     [](RenderJob& job) {
+       job.integrator = IntegratorKind::bdpt;
+       job.gradients = ReconstructionNorm::l1;
+       job.saveIllumination.clear();
+       job.checkpoint.clear();
+     }},
+    {"AOVs",
+     [](RenderJob& job) {
+       job.integrator = IntegratorKind::path;
+       job.aovs = {Aov::albedo, Aov::normal, Aov::depth, Aov::variance, Aov::samples};
+       job.saveIllumination.clear();
+     }},
+};
 
-int injectIntoRender(Countdown& countdown, const SceneFolder& folder) {
-  const RenderJob job = jobIn(folder.path());
+int injectInto(Countdown& countdown, const std::string& name, const RenderJob& job) {
   const StopFlag never = 0;
-  return injectInto(
-      countdown, folder / "out", [&] { run(job, never); },
-      [&] { return readFile(folder / "out" / "a.exr") + readFile(folder / "out" / "a.illum"); });
+  return inject(countdown, {name, job.outputs.front().parent_path(), [&] { run(job, never); }});
+}
+
+/// A job without the parts that take long, which the default, auto, has.
+RenderJob quickJobIn(const fs::path& folder) {
+  RenderJob job = jobIn(folder);
+  job.integrator = IntegratorKind::product;
+  job.russianRoulette = RussianRoulette::throughput;
+  job.lightPaths = LightPathUse::off;
+  return job;
+}
+
+int injectIntoResumed(Countdown& countdown, const fs::path& folder) {
+  RenderJob first = quickJobIn(folder);
+  first.samples = 1;
+  first.outputs = {folder / "first.exr"};
+  first.saveIllumination.clear();
+  first.checkpoint = folder / "start.ckpt";
+  const StopFlag never = 0;
+  run(first, never);
+  RenderJob rest = quickJobIn(folder);
+  rest.resume = first.checkpoint;
+  return injectInto(countdown, "resume", rest);
+}
+
+void injectIntoAll(Countdown& countdown, const SceneFolder& folder) {
+  for (const Render& render : kRenders) {
+    RenderJob job = quickJobIn(folder.path());
+    render.set(job);
+    CHECK(injectInto(countdown, render.name, job) > 0);
+  }
+  CHECK(injectIntoResumed(countdown, folder.path()) > 0);
 }
 
 int injectIntoCompile(Countdown& countdown, const SceneFolder& folder) {
@@ -205,15 +131,19 @@ int injectIntoCompile(Countdown& countdown, const SceneFolder& folder) {
   options.elevations = 4;
   options.settings.samples = 64;
   const std::vector<CompileJob> jobs = planCompile(uses, options);
-  return injectInto(
-      countdown, folder / "out", [&] { runCompile(jobs.front(), {}); }, [&] { return readFile(jobs.front().path); });
+  return inject(countdown, {"compile", folder / "out", [&] { runCompile(jobs.front(), {}); }});
 }
 
 }  // namespace
 
 TEST_CASE("faults: whichever allocation of a render fails") {
   const SceneFolder folder(true);
-  CHECK(injectIntoRender(allocations, folder) > 50);
+  CHECK(injectInto(allocations, "auto", jobIn(folder.path())) > 50);
+}
+
+TEST_CASE("faults: whichever task of a render fails", "[slow]") {
+  const SceneFolder folder(true);
+  CHECK(injectInto(tasks, "auto", jobIn(folder.path())) > 10);
 }
 
 TEST_CASE("faults: an allocation that fails while rendering does not lose the samples so far") {
@@ -238,22 +168,48 @@ TEST_CASE("faults: an allocation that fails while rendering does not lose the sa
       run(job, never);
     } catch (const std::exception&) {
       if (!fs::exists(picture)) continue;
+      CHECK(readImage(picture).width == 16);
       const ImageAttributes all = readAttributes(picture);
       rescued += all.contains("interrupted") || std::get<double>(all.at("samples")) < 64;
     }
   }
-  checkWhole(folder / "out");
   CHECK(rescued > 0);
 }
 
-TEST_CASE("faults: whichever write of a render fails") {
+TEST_CASE("faults: whichever write or read of a render fails") {
   const SceneFolder folder(true);
-  CHECK(injectIntoRender(writes, folder) > 5);
+  CHECK(injectInto(writes, "auto", jobIn(folder.path())) > 5);
+  CHECK(injectInto(reads, "auto", jobIn(folder.path())) > 0);
 }
 
-TEST_CASE("faults: whichever allocation of a compilation fails") {
+TEST_CASE("faults: whichever write or read of any kind of render fails") {
+  for (Countdown* countdown : {&writes, &reads}) injectIntoAll(*countdown, SceneFolder(true));
+}
+
+TEST_CASE("faults: whichever allocation of any kind of render fails", "[slow]") {
+  injectIntoAll(allocations, SceneFolder(true));
+}
+
+TEST_CASE("faults: whichever task of any kind of render fails", "[slow]") {
+  injectIntoAll(tasks, SceneFolder(true));
+}
+
+TEST_CASE("faults: whichever allocation or task of a compilation fails") {
   const SceneFolder folder(false);
   CHECK(injectIntoCompile(allocations, folder) > 50);
+  CHECK(injectIntoCompile(tasks, folder) > 0);
+}
+
+TEST_CASE("faults: whichever allocation or task of work that can be stopped fails") {
+  const Folder folder;
+  const StopFlag never = 0;
+  std::atomic<int> done = 0;
+  const auto work = [&] {
+    done = 0;
+    stoppable(never, "stopped", [&] { parallelFor(0, 100, [&](int) { ++done; }); });
+  };
+  for (Countdown* countdown : {&allocations, &tasks})
+    CHECK(inject(*countdown, {"stoppable work", folder / "out", work, [&] { return std::to_string(done); }}) > 0);
 }
 
 TEST_CASE("faults: whichever write of a compilation fails") {
