@@ -72,5 +72,11 @@ TEST_CASE("core: errors name what is not a regular file") {
   CHECK(message("/dev/null") == "/dev/null: is not a regular file");
 }
 
+TEST_CASE("core: too little memory for a file is named, but is not a fault of the file") {
+  const auto read = [] { return nameErrors("a.png", []() -> int { throw std::bad_alloc(); }); };
+  CHECK_THROWS_AS(read(), OutOfMemory);
+  CHECK_THROWS_WITH(read(), "a.png: not enough memory");
+}
+
 }  // namespace
 }  // namespace lobe
