@@ -68,9 +68,7 @@ const std::vector<Render> kRenders{
      }},
     {"gradients",
      [](RenderJob& job) {
-       job.integrator = IntegratorKind::path;
        job.gradients = ReconstructionNorm::l2;
-       job.saveIllumination.clear();
        job.checkpoint.clear();
      }},
     {"gradients of bdpt",
