@@ -27,8 +27,8 @@ struct TrainingOptions {
 
 class IlluminationTrainer {
  public:
-  /// sceneDiagonal: diagonal of a box around what the camera sees in world units, > 0. kept: records of an earlier training,
-  /// which stay as they are; their indices in cache() come first.
+  /// sceneDiagonal: diagonal of a box around what the camera sees in world units, > 0. kept: records of an earlier
+  /// training, which stay as they are; their indices in cache() come first.
   IlluminationTrainer(const TrainingOptions& options, float sceneDiagonal, std::vector<IlluminationRecord> kept = {});
 
   /// Performs one pass: updates every record from the particles near it, then creates a record for each request that no

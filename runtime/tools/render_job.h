@@ -47,7 +47,8 @@ struct RenderJob {
   IntegratorKind integrator = IntegratorKind::automatic;
   BdptGuide guide = BdptGuide::none;                  ///< only used by bdpt
   LightPathUse lightPaths = LightPathUse::automatic;  ///< only used by guided and product
-  /// Radius of vertex merging of vcm in the first sample, as a fraction of the visible region's diagonal, and how it shrinks.
+  /// Radius of vertex merging of vcm in the first sample, as a fraction of the visible region's diagonal, and how it
+  /// shrinks.
   MergeRadius merge{0.0015f, 0.75f};
   /// Gradient-domain rendering, and how the picture is reconstructed; empty: not used.
   std::optional<ReconstructionNorm> gradients;
