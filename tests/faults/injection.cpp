@@ -41,22 +41,23 @@ void* allocate(std::size_t size, std::size_t alignment) {
 }  // namespace
 }  // namespace lobe::test
 
+// Not inlined, or g++ would warn that memory of operator new is given to free.
 void* operator new(std::size_t size) {
   return lobe::test::allocate(size, 0);
 }
 void* operator new(std::size_t size, std::align_val_t alignment) {
   return lobe::test::allocate(size, static_cast<std::size_t>(alignment));
 }
-void operator delete(void* memory) noexcept {
+[[gnu::noinline]] void operator delete(void* memory) noexcept {
   std::free(memory);
 }
-void operator delete(void* memory, std::size_t) noexcept {
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept {
   std::free(memory);
 }
-void operator delete(void* memory, std::align_val_t) noexcept {
+[[gnu::noinline]] void operator delete(void* memory, std::align_val_t) noexcept {
   std::free(memory);
 }
-void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
+[[gnu::noinline]] void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
   std::free(memory);
 }
 

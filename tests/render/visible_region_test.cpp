@@ -67,7 +67,7 @@ Learnt train(const Scene& scene) {
   plan.importons = 10000;
   const TrainedIllumination trained = trainIllumination(ready, camera, nullptr, plan);
   float radius = 0;
-  for (const IlluminationRecord& record : cacheOf(trained.radiance).records()) radius = std::max(radius, record.radius);
+  for (const IlluminationRecord& record : cacheOf(trained.field).records()) radius = std::max(radius, record.radius);
   return {static_cast<double>(trained.report.particles()), radius};
 }
 
@@ -109,7 +109,7 @@ TEST_CASE("visible region: photons and records of a room do not depend on the si
 TEST_CASE("visible region: photons that start on its disc pass through it, from outside the scene") {
   const Scene scene = onGround(4000);
   RenderScene ready(scene);
-  const Eigen::AlignedBox3f room({-0.5f, -0.5f, -0.5f}, {4.5f, 3.5f, 4.5f});
+  const Eigen::AlignedBox3f room(Vec3(-0.5f, -0.5f, -0.5f), Vec3(4.5f, 3.5f, 4.5f));
   ready.lights.focus(room);
   const SceneSphere& region = ready.lights.region();
   CHECK(region.diagonal() == Approx(room.diagonal().norm()));
