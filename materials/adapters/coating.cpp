@@ -6,6 +6,7 @@
 #include "materials/lobes/fresnel.h"
 #include "materials/models.h"
 #include "materials/reflectance.h"
+#include "runtime/core/sampling.h"
 
 namespace lobe {
 namespace {
@@ -35,7 +36,7 @@ class Coating final : public CoatedBsdf {
     if (!(specular + nested > 0.0f) || wo.z() == 0.0f) return std::nullopt;
     const float p = specular / (specular + nested);
     if (choice < p) return DeltaSample{Vec3(-wo.x(), -wo.y(), wo.z()), mirrored / p, 1.0f, p};
-    std::optional<DeltaSample> result = base().sampleDelta(wo, uv, (choice - p) / (1.0f - p));
+    std::optional<DeltaSample> result = base().sampleDelta(wo, uv, rescaledAbove(p, choice));
     if (!result) return std::nullopt;
     result->weight *= transmittance(std::abs(wo.z())) * transmittance(std::abs(result->wi.z())) / (1.0f - p);
     result->probability *= 1.0f - p;

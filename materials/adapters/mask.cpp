@@ -2,6 +2,7 @@
 
 #include "materials/models.h"
 #include "materials/reflectance.h"
+#include "runtime/core/sampling.h"
 
 namespace lobe {
 namespace {
@@ -29,7 +30,7 @@ class Mask final : public Bsdf {
     if (!(total > 0.0f)) return std::nullopt;
     const float pass = p.pass / total;
     if (choice < pass) return DeltaSample{-wo, (1.0f - a) / pass, 1.0f, pass};
-    std::optional<DeltaSample> result = nested_->sampleDelta(wo, uv, (choice - pass) / (1.0f - pass));
+    std::optional<DeltaSample> result = nested_->sampleDelta(wo, uv, rescaledAbove(pass, choice));
     if (!result) return std::nullopt;
     result->weight *= a / (1.0f - pass);
     result->probability *= 1.0f - pass;

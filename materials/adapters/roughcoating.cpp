@@ -7,6 +7,7 @@
 #include "materials/lobes/rough_transmittance.h"
 #include "materials/lobes/roughness.h"
 #include "materials/models.h"
+#include "runtime/core/sampling.h"
 
 namespace lobe {
 namespace {
@@ -45,7 +46,7 @@ class RoughCoating final : public CoatedBsdf {
       const std::optional<Vec3> wi = roughness.microfacet.sampleReflection(upright(wo, wo), u);
       return wi ? sampled(wo, upright(*wi, wo), uv, 1.0f) : std::nullopt;
     }
-    const std::optional<BsdfSample> nested = base().sample(wo, uv, (choice - p) / (1.0f - p), u);
+    const std::optional<BsdfSample> nested = base().sample(wo, uv, rescaledAbove(p, choice), u);
     return nested ? sampled(wo, nested->wi, uv, nested->eta) : std::nullopt;
   }
 

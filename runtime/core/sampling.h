@@ -1,6 +1,7 @@
 #pragma once
 // Maps from uniform random numbers to points and directions, with their densities over solid angle.
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -12,6 +13,12 @@ inline constexpr float kPi = std::numbers::pi_v<float>;
 inline constexpr float kInvPi = std::numbers::inv_pi_v<float>;
 /// The largest float below one, the upper bound of uniform random numbers in [0, 1).
 inline constexpr float kOneMinusEpsilon = 0x1.fffffep-1f;
+
+/// Maps a random number that is uniform in [bound, 1) to [0, 1), so that it can be used for another choice. bound < 1.
+inline float rescaledAbove(float bound, float choice) {
+  // The quotient may be rounded to 1.
+  return std::min((choice - bound) / (1.0f - bound), kOneMinusEpsilon);
+}
 
 /// Maps u uniform in [0,1)² to a uniformly distributed point of the unit disc.
 inline Vec2 squareToDisk(const Vec2& u) {

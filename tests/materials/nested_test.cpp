@@ -85,6 +85,30 @@ void checkSame(const Bsdf& a, const Bsdf& b, const Vec2& uv) {
   }
 }
 
+/// Remembers the largest random number with which it was asked for a sample. White; delta: deltaProbability.
+class ChoiceRecorder final : public Bsdf {
+ public:
+  explicit ChoiceRecorder(float delta) : delta_(delta) {}
+  Rgb eval(const Vec3&, const Vec3&, const Vec2&) const override { return Rgb::Zero(); }
+  std::optional<BsdfSample> sample(const Vec3&, const Vec2&, float choice, const Vec2&) const override {
+    largest_ = std::max(largest_, choice);
+    return std::nullopt;
+  }
+  float pdf(const Vec3&, const Vec3&, const Vec2&) const override { return 0.0f; }
+  std::optional<DeltaSample> sampleDelta(const Vec3&, const Vec2&, float choice) const override {
+    largest_ = std::max(largest_, choice);
+    return std::nullopt;
+  }
+  float deltaProbability(const Vec3&, const Vec2&) const override { return delta_; }
+  LobeMixture mixture(const Vec3&, const Vec2&) const override { return {}; }
+  Rgb albedo(const Vec3&, const Vec2&) const override { return grey(1.0f); }
+  float largest() const { return largest_; }
+
+ private:
+  float delta_;
+  mutable float largest_ = 0.0f;
+};
+
 }  // namespace
 
 TEST_CASE("materials: null passes all light straight through") {
@@ -305,6 +329,24 @@ TEST_CASE("materials: mapped normals in a blend are averaged by weight") {
   CHECK(normal(blendOf(1.0, flat, leaning)).isApprox(Vec3(0.6f, 0.0f, 0.8f), 1e-5f));
   CHECK(normal(blendOf(0.3, leaning, leaning)).isApprox(Vec3(0.6f, 0.0f, 0.8f), 1e-5f));
   CHECK(normal(blendOf(0.5, flat, leaning)).isApprox(Vec3(0.3f, 0.0f, 0.9f).normalized(), 1e-5f));
+}
+
+TEST_CASE("materials: random numbers that serve for a second choice stay below 1") {
+  const auto masked = std::make_shared<ChoiceRecorder>(1.0f), coated = std::make_shared<ChoiceRecorder>(1.0f),
+             roughlyCoated = std::make_shared<ChoiceRecorder>(0.0f);
+  const BsdfPtr coating = bsdfOf("coating", {}, {coated}), roughCoating = bsdfOf("roughcoating", {}, {roughlyCoated});
+  Rng rng(41);
+  for (int i = 0; i < 2000; ++i) {
+    const Vec3 wo = squareToSphere(rng.uniform2());
+    const BsdfPtr mask = bsdfOf("mask", {{"opacity", static_cast<double>(rng.uniform())}}, {masked});
+    mask->sampleDelta(wo, kUv, kOneMinusEpsilon);
+    coating->sampleDelta(wo, kUv, kOneMinusEpsilon);
+    roughCoating->sample(wo, kUv, kOneMinusEpsilon, Vec2(0.5f, 0.5f));
+  }
+  for (const auto& recorder : {masked, coated, roughlyCoated}) {
+    CHECK(recorder->largest() > 0.99f);
+    CHECK(recorder->largest() < 1.0f);
+  }
 }
 
 }  // namespace lobe
