@@ -1,6 +1,7 @@
 // The comparison of integrators by which loberender chooses one.
 
 #include <array>
+#include <limits>
 
 #include <catch2/catch.hpp>
 
@@ -38,6 +39,19 @@ class NoisyAtTheRight : public Integrator {
   float firstX_;  // of the direction at distance 1
 };
 
+/// Noisy, with a few samples of another value.
+class Faulty : public Noisy {
+ public:
+  Faulty(float noise, float value) : Noisy(noise, 1), value_(value) {}
+  Rgb radiance(const Ray& ray, Sampler& rng, PathStatistics& statistics) const override {
+    const Rgb sample = Noisy::radiance(ray, rng, statistics);
+    return rng.uniform() < 1e-3f ? Rgb(Rgb::Constant(value_)) : sample;
+  }
+
+ private:
+  float value_;
+};
+
 RayCamera cameraOf(int width, int height) {
   Camera camera;
   camera.width = width, camera.height = height;
@@ -57,6 +71,16 @@ TEST_CASE("pilot: variance and cost of integrators are those of their samples") 
   CHECK(results[0].cost == Approx(4));
   CHECK(results[1].cost == Approx(1));
   CHECK(results[0].inefficiency() < results[1].inefficiency());
+}
+
+TEST_CASE("pilot: samples that a film drops decide nothing") {
+  using Limits = std::numeric_limits<float>;
+  const Faulty faulty(0.9f, GENERATE(Limits::infinity(), Limits::quiet_NaN(), -1e6f));
+  const Noisy sound(0.3f, 1);
+  const std::array<const Integrator*, 2> both{&sound, &faulty};
+  const auto results = comparePilots(cameraOf(160, 90), both, {.tiles = 128, .samples = 8, .seed = 3});
+  CHECK(results[0].variance == Approx(0.09 / 24 / 1.25).epsilon(0.1));
+  CHECK(results[1].variance == Approx(0.81 / 24 / 1.25).epsilon(0.1));
 }
 
 TEST_CASE("pilot: pixels are spread over the columns of the image") {

@@ -8,6 +8,7 @@
 #include "runtime/core/random.h"
 #include "runtime/core/statistics.h"
 #include "runtime/core/stopwatch.h"
+#include "runtime/render/film/film.h"
 
 namespace lobe {
 namespace {
@@ -59,6 +60,21 @@ struct PixelPair {
   Radiance mean() const { return 0.5 * (means[0] + means[1]); }
 };
 
+/// The mean of the samples that a film would not drop.
+class UsableMean {
+ public:
+  void add(const Rgb& sample) {
+    if (!isUsableSample(sample)) return;
+    sum_ += sample.cast<double>();
+    ++count_;
+  }
+  Radiance mean() const { return sum_ / std::max(1, count_); }
+
+ private:
+  Radiance sum_ = Radiance::Zero();
+  int count_ = 0;
+};
+
 PixelPair renderPair(const RayCamera& camera, const Integrator& integrator, std::uint64_t pixel,
                      const PilotOptions& options) {
   PixelPair pair;
@@ -67,11 +83,13 @@ PixelPair renderPair(const RayCamera& camera, const Integrator& integrator, std:
   const auto width = static_cast<std::uint64_t>(camera.width());
   for (std::size_t picture = 0; picture < 2; ++picture) {
     const std::uint64_t seed = Rng(options.seed, kTag, picture).next();
+    UsableMean usable;
     for (int s = 0; s < options.samples; ++s) {
       Sampler rng = Sampler::stratified(seed, pixel, static_cast<std::uint32_t>(s));
       const Ray ray = camera.sample(static_cast<int>(pixel % width), static_cast<int>(pixel / width), rng);
-      pair.means[picture] += integrator.radiance(ray, rng, statistics).cast<double>() / options.samples;
+      usable.add(integrator.radiance(ray, rng, statistics));
     }
+    pair.means[picture] = usable.mean();
   }
   pair.cost = (options.timed ? watch.seconds() : statistics.cost()) / (2.0 * options.samples);
   return pair;
