@@ -94,6 +94,8 @@ RenderResult resultOf(const CheckpointFile& file, const std::filesystem::path& p
     throw std::runtime_error(fmt::format("{}: damaged: {} counters, expected {}", path.string(),
                                          file.info().counters.size(), counters.size()));
   for (std::size_t i = 0; i < counters.size(); ++i) *counters[i] = file.info().counters[i];
+  if (!result.statistics.largest.isValid())
+    throw std::runtime_error(fmt::format("{}: damaged: impossible contributions of paths", path.string()));
   return result;
 }
 

@@ -23,7 +23,7 @@ std::vector<std::byte> encodeCheckpoint(const RunSettings& settings, const Film&
                                         std::span<const std::byte> importance);
 
 Film filmOf(const CheckpointFile& file);
-/// Throws std::runtime_error if the file does not have the counters of this version.
+/// Throws std::runtime_error if the file does not have the counters of this version, or impossible ones.
 RenderResult resultOf(const CheckpointFile& file, const std::filesystem::path& path);
 TrainingReport trainingOf(const CheckpointFile& file);
 /// Sets guiding.pilot and guiding.lightPaths, so that the run goes on with what it has chosen.

@@ -18,6 +18,7 @@
 
 #include "runtime/image/image.h"
 #include "runtime/image/image_output.h"
+#include "runtime/tools/checkpoint.h"
 #include "tests/support/json.h"
 #include "tests/support/loberender_test_tools.h"
 
@@ -365,4 +366,26 @@ TEST_CASE("loberender: a checkpoint of another run is refused") {
   CHECK_THAT(fault(folder, render + " --resume a.illum", 1), Contains("a Lobe file of kind 'ILLU', expected 'CKPT'"));
   folder.write("run.ckpt", folder.bytes("run.ckpt").substr(0, 5000));
   CHECK_THAT(refusal(render), Contains("run.ckpt: truncated"));
+}
+
+TEST_CASE("loberender: a checkpoint with impossible contributions of paths is refused") {
+  const Folder folder;
+  const fs::path path = folder / "run.ckpt";
+  // The contribution in one place of a heap, with the least in front; the others are none.
+  const auto readBack = [&](LargestContributions::Key key, std::size_t place) {
+    RenderResult result;
+    result.statistics.largest.keys[place] = key;
+    const std::vector<std::byte> bytes = encodeCheckpoint({}, Film(1, 1), result, Guiding(), {}, {});
+    writeAtomically(path, std::span<const std::byte>(bytes));
+    return resultOf(CheckpointFile::open(path), path).statistics.largest.keys[place];
+  };
+  constexpr std::size_t kLast = LargestContributions::kCount - 1;
+  // Of luminance 1, with 2 segments, by next-event estimation.
+  constexpr LargestContributions::Key kPossible = 0x3f800000'00020100;
+  CHECK(readBack(kPossible, kLast) == kPossible);
+  CHECK_THROWS_WITH(readBack(kPossible, 0), Contains("run.ckpt: damaged"));
+  const std::vector<LargestContributions::Key> impossible{0x3f800000'00020500, 0x3f800000'0002ff00, 0x7f800000'00020100,
+                                                          0xbf800000'00020100, 0x00000000'00020100};
+  for (const LargestContributions::Key key : impossible)
+    CHECK_THROWS_WITH(readBack(key, kLast), Contains("run.ckpt: damaged"));
 }

@@ -47,10 +47,18 @@ class LargestContributions {
     return {static_cast<Technique>(key >> 8 & 0xff), static_cast<int>(key >> 16 & 0xffff), (key & 1) != 0};
   }
 
+  /// Whether the keys, which may come from a file, are a possible result of add.
+  bool isValid() const { return std::ranges::is_heap(keys, std::greater<>()) && std::ranges::all_of(keys, isPossible); }
+
   std::array<Key, kCount> keys{};  ///< a heap, with the least in front
 
  private:
   static constexpr int kMostSegments = 0xffff;
+  static bool isPossible(Key key) {
+    const float value = luminanceOf(key);
+    const auto technique = static_cast<std::size_t>(kindOf(key).technique);
+    return key == 0 || (value > 0 && std::isfinite(value) && technique < kTechniqueNames.size());
+  }
   void add(Key key) {
     if (key <= keys.front()) return;
     std::pop_heap(keys.begin(), keys.end(), std::greater<>());
