@@ -58,7 +58,7 @@ std::vector<Receiver> receiversOfPaths(const RenderScene& scene, const RayCamera
                                        std::uint64_t seed) {
   std::vector<Receiver> chosen;
   PathStatistics statistics;
-  const PathOptions options{kReceiverDepth, kReceiverDepth};
+  const PathOptions options{kReceiverDepth, kReceiverDepth, nullptr, scene.scene.emitterVisibility};
   for (int i = 0; i < count; ++i) {
     Sampler rng(seed, 0, i);
     const Vec2 pixel = rng.uniform2();
@@ -76,7 +76,7 @@ std::vector<Receiver> receiversOfPaths(const RenderScene& scene, const RayCamera
 std::optional<Receiver> firstReceiver(const RenderScene& scene, Ray ray) {
   constexpr int maxSurfaces = 64;
   for (int i = 0; i < maxSurfaces; ++i) {
-    const std::optional<SurfaceHit> hit = scene.tracer.trace(ray);
+    const std::optional<SurfaceHit> hit = i == 0 ? scene.firstVisible(ray) : scene.tracer.trace(ray);
     if (!hit || !hit->bsdf) return std::nullopt;
     if (hit->bsdf->deltaProbability(hit->wo, hit->uv) < 1) return receiverOf(*hit);
     const std::optional<DeltaSample> sample = sampleDelta(*hit, 0.5f);

@@ -39,9 +39,9 @@ std::vector<Receiver> receiversOfPaths(const RenderScene& scene, const RayCamera
 /// emitter.
 Rgb emissionLeftToNee(const RenderScene& scene, const Receiver& receiver, const Ray& ray);
 
-/// The first surface along a ray that is not purely specular (delta), on the side from which the ray arrives. At delta
-/// surfaces the ray follows the most probable direction. nullopt if it leaves the scene, is absorbed, or meets too many
-/// delta surfaces.
+/// The first surface along a ray of the camera that is not purely specular (delta), on the side from which the ray
+/// arrives. At delta surfaces the ray follows the most probable direction. nullopt if it leaves the scene, is absorbed,
+/// or meets too many delta surfaces.
 std::optional<Receiver> firstReceiver(const RenderScene& scene, Ray ray);
 
 /// The density of directions over solid angle that the cache provides for a receiver, or the cosine density if no

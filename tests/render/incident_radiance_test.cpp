@@ -80,6 +80,20 @@ TEST_CASE("render: receivers are found through mirrors and not where rays escape
   CHECK_FALSE(firstReceiver(ready, {{0, 0, 4}, Vec3::UnitZ()}));
 }
 
+TEST_CASE("render: receivers are found behind emitters that the camera does not see") {
+  Scene scene;
+  const int diffuse = addMaterial(scene, std::make_shared<Diffuse>(0.5f));
+  addShape(scene, rectangle({-5, -5, 0}, {10, 0, 0}, {0, 10, 0}), diffuse);
+  addEmitter(scene, rectangle({-5, -5, 1}, {0, 10, 0}, {10, 0, 0}), 1, diffuse);
+  const auto found = [&](EmitterVisibility visibility) {
+    scene.emitterVisibility = visibility;
+    return firstReceiver(RenderScene(scene), {{0, 0, 2}, -Vec3::UnitZ()});
+  };
+  REQUIRE((found(EmitterVisibility::dark) && found(EmitterVisibility::hidden)));
+  CHECK(found(EmitterVisibility::dark)->point.position.z() == Approx(1));
+  CHECK(found(EmitterVisibility::hidden)->point.position.z() == Approx(0).margin(1e-5));
+}
+
 TEST_CASE("render: held-out particles are selected as for training a record") {
   const Vec3 up = Vec3::UnitZ();
   const std::vector<Particle> particles{

@@ -350,6 +350,16 @@ TEST_CASE("render: a scene with a single light learns nothing") {
   CHECK(learnt(RenderScene(scene)).empty());
 }
 
+TEST_CASE("render: the choice of lights is learnt behind emitters that the camera does not see") {
+  Scene scene;
+  scene.emitterVisibility = EmitterVisibility::hidden;
+  addShape(scene, rectangle({-3, -3, 4}, {0, 6, 0}, {6, 0, 0}), addMaterial(scene, std::make_shared<Diffuse>(0.5f)));
+  addEmitter(scene, rectangle({-1, -1, 1}, {2, 0, 0}, {0, 2, 0}), 1);  // covers the view
+  addEmitter(scene, Sphere{{0, 2, 3}, 0.2f}, 1);
+  scene.camera.width = scene.camera.height = 32;
+  CHECK_FALSE(learnt(RenderScene(scene)).empty());
+}
+
 TEST_CASE("render: ten thousand lights are chosen by place") {
   Scene scene = manyLights(100);
   scene.camera.width = scene.camera.height = 64;

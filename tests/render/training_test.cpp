@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "materials/registry.h"
+#include "runtime/guiding/field_data.h"
 #include "runtime/guiding/sample_storage_data.h"
 #include "runtime/render/training/training.h"
 #include "tests/support/render_test_tools.h"
@@ -281,4 +282,27 @@ TEST_CASE("training: photons that gain light at every bounce need bounded memory
   for (int bounces = 1; bounces < kMaxTrainingDepth; ++bounces)
     expected += 4 * kPi * intensity * std::pow(albedo, bounces);
   CHECK(flux == Approx(expected).epsilon(0.01));
+}
+
+TEST_CASE("training: records serve what the camera sees through hidden emitters") {
+  Scene scene;
+  scene.emitterVisibility = EmitterVisibility::hidden;
+  const int wall = addMaterial(scene, std::make_shared<Diffuse>(kAlbedo));
+  addShape(scene, rectangle({-3, -3, 4}, {0, 6, 0}, {6, 0, 0}), wall);
+  // A lamp that faces the wall and covers the view.
+  addEmitter(scene, rectangle({-1, -1, 1}, {2, 0, 0}, {0, 2, 0}), 1,
+             addMaterial(scene, std::make_shared<Diffuse>(0.0f)));
+  scene.camera.width = scene.camera.height = 16;
+  TrainingPlan plan;
+  plan.passes = 1;
+  plan.photons = plan.importons = 2000;
+  const RenderScene ready(scene);
+  const Field field = trainIllumination(ready, RayCamera(scene.camera, {}), nullptr, plan).field;
+  int served = 0;
+  for (int y = 0; y < 10; ++y)
+    for (int x = 0; x < 10; ++x) {
+      const Vec3 seen(0.3f * static_cast<float>(x) - 1.35f, 0.3f * static_cast<float>(y) - 1.35f, 4);
+      served += cacheOf(field).find(seen, -Vec3::UnitZ()) != nullptr;
+    }
+  CHECK(served > 50);
 }

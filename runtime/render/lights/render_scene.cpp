@@ -50,6 +50,11 @@ std::optional<SurfaceHit> RenderScene::firstVisible(Ray ray, EmitterVisibility v
   }
 }
 
+std::optional<SurfaceHit> RenderScene::firstVisible(const Ray& ray) const {
+  std::uint64_t rays = 0;
+  return firstVisible(ray, scene.emitterVisibility, rays);
+}
+
 bool RenderScene::visibleToCamera(const SurfaceHit& point, const Ray& ray, EmitterVisibility visibility) const {
   const Vec3 origin = offsetPoint(point, -ray.direction);
   if (visibility != EmitterVisibility::hidden) return !tracer.occluded({origin, ray.origin - origin, 1.0f});

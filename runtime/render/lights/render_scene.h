@@ -53,6 +53,8 @@ struct RenderScene {
   /// The first surface that the camera sees along one of its rays. `rays` is increased by the number of rays traced;
   /// the distance of the hit is from the origin of `ray`, also behind emitters that are hidden.
   std::optional<SurfaceHit> firstVisible(Ray ray, EmitterVisibility visibility, std::uint64_t& rays) const;
+  /// The same with the visibility that the scene has, without a count.
+  std::optional<SurfaceHit> firstVisible(const Ray& ray) const;
   /// Whether the camera sees the point of a surface at the end of its ray.
   bool visibleToCamera(const SurfaceHit& point, const Ray& ray, EmitterVisibility visibility) const;
 

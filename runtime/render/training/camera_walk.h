@@ -23,7 +23,7 @@ void walkFromCamera(const RenderScene& scene, const RayCamera& camera, Sampler& 
   constexpr float kMaxSurvival = 0.95f;
   Ray ray = sampleCameraRay(camera, rng);
   for (int depth = 1; depth <= kMaxDepth; ++depth) {
-    const std::optional<SurfaceHit> hit = scene.tracer.trace(ray);
+    const std::optional<SurfaceHit> hit = depth == 1 ? scene.firstVisible(ray) : scene.tracer.trace(ray);
     if (!hit || !hit->bsdf || !sidesAgree(*hit, hit->woWorld, hit->wo)) return;
     const float delta = hit->bsdf->deltaProbability(hit->wo, hit->uv);
     visit(*hit, delta);
