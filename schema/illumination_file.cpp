@@ -55,7 +55,7 @@ IlluminationInfo readInfo(const fb::Illumination& file) {
           .scene = file.scene()->str(),
           .sceneHash = file.scene_hash(),
           .settings = {s.from()->str(), s.passes(), s.photons(), s.importons(), s.components(), s.seed(),
-                       s.learnt_fractions()},
+                       s.learnt_fractions(), s.max_depth()},
           .particles = file.particles(),
           .undersampledFraction = file.undersampled_fraction(),
           .unit = file.unit()};
@@ -75,6 +75,7 @@ IlluminationFile::IlluminationFile(FileContent file, const std::filesystem::path
   if (!(info_.unit > 0 && std::isnormal(info_.unit))) refuseDamaged(name, "the unit of length is out of range");
   if (!(info_.undersampledFraction >= 0 && info_.undersampledFraction <= 1))
     refuseDamaged(name, "fraction of undersampled records out of range");
+  if (info_.settings.maxDepth < 0) refuseDamaged(name, "maximum length of paths out of range");
   checkComponents(components_, name);
   for (std::size_t i = 0; i < records_.size(); ++i) {
     checkRecord(records_[i], i, components_, name);
@@ -97,7 +98,7 @@ std::vector<std::byte> encodeIllumination(const IlluminationInfo& info, std::spa
   flatbuffers::FlatBufferBuilder builder(1024 + records.size_bytes() + components.size_bytes());
   const StoredTrainingSettings& s = info.settings;
   const auto settings = fb::CreateTrainingSettings(builder, builder.CreateString(s.from), s.passes, s.photons,
-                                                   s.importons, s.components, s.seed, s.learntFractions);
+                                                   s.importons, s.components, s.seed, s.learntFractions, s.maxDepth);
   const auto toolVersion = builder.CreateString(info.toolVersion);
   const auto scene = builder.CreateString(info.scene);
   const auto recordVector =

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,7 +13,7 @@
 
 namespace lobe {
 
-inline constexpr FileFormat kIlluminationFormat{{'I', 'L', 'L', 'U'}, 2, 1};
+inline constexpr FileFormat kIlluminationFormat{{'I', 'L', 'L', 'U'}, 2, 2};
 
 /// A record, read in place: the layout equals that of the schema (size checked at compile time, order of the fields by
 /// a test). A new field must be added here, to illumination.fbs, to the checks in illumination_file.cpp, and to
@@ -31,6 +32,8 @@ struct StoredTrainingSettings {
   std::uint32_t passes = 0, photons = 0, importons = 0, components = 0;
   std::uint64_t seed = 0;
   bool learntFractions = false;  ///< whether bsdfFraction was learnt for each record
+  /// Maximum number of segments of the paths whose light was learnt.
+  std::int32_t maxDepth = std::numeric_limits<std::int32_t>::max();
   bool operator==(const StoredTrainingSettings&) const = default;
 };
 

@@ -50,10 +50,13 @@ Neighbourhood neighbourhoodOf(const IlluminationRecord& record, const RenderScen
   return neighbours.around(record.position, record.normal, record.tangent);
 }
 
-IncidentRadiance lightAt(const RenderScene& scene, const Field& field, const Receiver& receiver,
+/// The light of paths as long as those of the training.
+IncidentRadiance lightAt(const RenderScene& scene, const TrainedIllumination& illumination, const Receiver& receiver,
                          const ServedDensity& density) {
-  const GuidedSampler sampler(scene.scene, field, nullptr);
-  const GuidedIntegrator paths(scene, {}, sampler);
+  const GuidedSampler sampler(scene.scene, illumination.field, nullptr);
+  PathOptions pathOptions;
+  pathOptions.maxDepth = illumination.maxDepth - 1;  // without the segment to the camera
+  const GuidedIntegrator paths(scene, pathOptions, sampler);
   IncidentRadianceOptions options;
   options.cells = kCells;
   options.perCell = 16;
@@ -143,7 +146,7 @@ RecordView viewRecord(const RenderScene& scene, const Receiver& receiver, const 
   const Neighbourhood around = neighbourhoodOf(record, scene, illumination, options);
   Histogram particles, truth;
   for (const WeightedPoint& p : around.points) particles.add(p.y, p.weight);
-  const IncidentRadiance light = lightAt(scene, illumination.field, receiver, density);
+  const IncidentRadiance light = lightAt(scene, illumination, receiver, density);
   for (const IncidentRadiance::Sample& s : light.samples())
     truth.add(toDisc(density.frame().toLocal(s.wi)), 0.5 * (s.first + s.second) / s.density);
 

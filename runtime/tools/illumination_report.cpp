@@ -68,6 +68,11 @@ Json recordJson(const IlluminationFile& file, const StoredIllumination& r) {
   return json;
 }
 
+/// Whether paths in training had a maximum length.
+bool isLimited(const StoredTrainingSettings& settings) {
+  return settings.maxDepth < StoredTrainingSettings().maxDepth;
+}
+
 std::string vectorText(const std::array<float, 3>& v) {
   return fmt::format("{:.4g} {:.4g} {:.4g}", v[0], v[1], v[2]);
 }
@@ -90,7 +95,8 @@ Json toJson(const IlluminationFile& file, const std::filesystem::path& path, boo
               {"importons", s.importons},
               {"components", s.components},
               {"seed", s.seed},
-              {"learnt_fractions", s.learntFractions}}},
+              {"learnt_fractions", s.learntFractions},
+              {"max_depth", isLimited(s) ? Json(s.maxDepth) : Json()}}},
             {"particles", info.particles},
             {"unit", shortNumber(info.unit)},
             {"bytes", file.bytes()},
@@ -108,10 +114,11 @@ void printIllumination(const IlluminationFile& file, const std::filesystem::path
   const IlluminationInfo& info = file.info();
   const StoredTrainingSettings& s = info.settings;
   fmt::print(out, "{}\n  scene      {}, hash {:016x}\n", path.string(), info.scene, info.sceneHash);
-  fmt::print(
-      out,
-      "  settings   trained from {}, {} passes of {} photons and {} importons, {} components, seed {}, {} fractions\n",
-      s.from, s.passes, s.photons, s.importons, s.components, s.seed, s.learntFractions ? "learnt" : "fixed");
+  fmt::print(out,
+             "  settings   trained from {}, {} passes of {} photons and {} importons, {} components, seed {}, {} "
+             "fractions{}\n",
+             s.from, s.passes, s.photons, s.importons, s.components, s.seed, s.learntFractions ? "learnt" : "fixed",
+             isLimited(s) ? fmt::format(", paths of up to {} segments", s.maxDepth) : "");
   fmt::print(out, "  training   {} particles; unit of length {:.4g}\n", info.particles, info.unit);
   fmt::print(out, "  records    {}, {:.2f} % undersampled\n", file.records().size(), 100 * info.undersampledFraction);
   fmt::print(out, "  format {}.{}, Lobe {}, {} bytes, hash {:016x}\n", file.header().major, file.header().minor,

@@ -225,18 +225,24 @@ void Run::readIllumination(const IlluminationFile& file, const std::filesystem::
     printNote(kTool, fmt::format("{}: the records have learnt no BSDF sampling fractions (trained by guided, or with "
                                  "--bsdf-fraction fixed); all use {:.1f}",
                                  path.string(), kInitialBsdfFraction));
+  if (guiding_.training.maxDepth < planOf(job_, *scene_).maxDepth)
+    printNote(kTool,
+              fmt::format("{}: trained for paths of up to {} segments; the light that only longer ones find is not "
+                          "guided",
+                          path.string(), guiding_.training.maxDepth));
   load_.restoring = restoring.seconds();
 }
 
 void Run::makeGuiding() {
-  const TrainingPlan plan = planOf(job_);
+  const TrainingPlan plan = planOf(job_, *scene_);
   if (!resumed_ && (job_.illumination.empty() || job_.trainsFurther()))
     train(job_, plan, *renderScene_, *camera_, guiding_);
   if (!job_.checkpoint.empty() || !job_.saveIllumination.empty())
     illumination_ = encodeIllumination(guiding_.training, plan, *scene_, job_.scene);
   if (!job_.checkpoint.empty() && guiding_.training.importance.records() > 0)
     importance_ =
-        encodeIllumination({guiding_.training.importance, guiding_.training.report, {}, {}}, plan, *scene_, job_.scene);
+        encodeIllumination({guiding_.training.importance, guiding_.training.report, {}, {}, guiding_.training.maxDepth},
+                           plan, *scene_, job_.scene);
   guiding_.reduceRecords(job_.reduction);
   guiding_.sampler.emplace(*scene_, guiding_.training.field, guiding_.cachesOrNull());
   guiding_.lightSampler.emplace(*scene_, guiding_.training.importance, nullptr);

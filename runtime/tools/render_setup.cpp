@@ -76,7 +76,7 @@ std::unique_ptr<BidirectionalIntegrator> makeWithLightPaths(const RenderJob& job
   const Stopwatch watch;
   const int paths = static_cast<int>(kPaths * preparationSize(job));
   if (scene.lights.environmentProbability() > 0)
-    guiding.environmentGuide.emplace(learnEnvironmentGuide(scene, camera, *guiding.sampler, paths, job.seed));
+    guiding.environmentGuide.emplace(learnEnvironmentGuide(scene, camera, options, *guiding.sampler, paths, job.seed));
   const PhotonEmission emission(scene.lights, guiding.environmentGuide ? &*guiding.environmentGuide : nullptr);
   if (!guiding.lightPaths) {
     guiding.lightPaths = tryLightPaths(scene, camera, options, *guiding.sampler, emission, paths, job.seed);
@@ -188,9 +188,10 @@ std::unique_ptr<BidirectionalIntegrator> makeVcm(const RenderJob& job, const Ren
 
 }  // namespace
 
-TrainingPlan planOf(const RenderJob& job) {
+TrainingPlan planOf(const RenderJob& job, const Scene& scene) {
   TrainingPlan plan = job.training;
   plan.seed = job.seed;
+  plan.maxDepth = pathOptions(job, scene).maxDepth;
   plan.keepParticles = job.record.has_value();
   plan.keepImportance = job.integrator == IntegratorKind::bdpt;
   plan.seconds = job.trainSeconds.value_or(job.seconds ? kTrainingFraction * *job.seconds : kInfinity);
@@ -211,7 +212,9 @@ void train(const RenderJob& job, const TrainingPlan& plan, const RenderScene& sc
       scene, camera, guiding.cachesOrNull(), start,
       [&](const PassReport& pass) { progress.advance(timed ? pass.seconds : 1.0); }, earlier.field,
       early ? extendIfProductPays(job, scene, camera, guiding) : ExtendTraining());
-  if (earlier.field.records() > 0 && !earlier.report.learntFractions) guiding.training.report.learntFractions = false;
+  if (earlier.field.records() == 0) return;
+  if (!earlier.report.learntFractions) guiding.training.report.learntFractions = false;
+  guiding.training.maxDepth = std::min(guiding.training.maxDepth, earlier.maxDepth);
 }
 
 RunSettings settingsOf(const RenderJob& job, const Scene& scene, const Guiding& guiding,

@@ -72,7 +72,7 @@ using AnyIntegrator =
                  std::unique_ptr<GradientIntegrator>, std::unique_ptr<BidirectionalGradientIntegrator>>;
 
 /// The plan of training for the options.
-TrainingPlan planOf(const RenderJob& job);
+TrainingPlan planOf(const RenderJob& job, const Scene& scene);
 
 /// Trains the illumination, with a progress line. Sets guiding.training, starting with what it holds.
 void train(const RenderJob& job, const TrainingPlan& plan, const RenderScene& scene, const RayCamera& camera,

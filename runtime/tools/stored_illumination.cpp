@@ -23,14 +23,16 @@ std::string nameOf(TrainFrom from) {
   return std::ranges::find(names, from, [](const auto& entry) { return entry.second; })->first;
 }
 
-StoredTrainingSettings settingsOf(const TrainingPlan& plan, const TrainingReport& report) {
+StoredTrainingSettings settingsOf(const TrainingPlan& plan, const TrainedIllumination& trained) {
+  const TrainingReport& report = trained.report;
   return {.from = nameOf(plan.from),
           .passes = static_cast<std::uint32_t>(report.passes.size()),
           .photons = static_cast<std::uint32_t>(plan.photons),
           .importons = static_cast<std::uint32_t>(plan.importons),
           .components = static_cast<std::uint32_t>(plan.records.components),
           .seed = plan.seed,
-          .learntFractions = report.learntFractions};
+          .learntFractions = report.learntFractions,
+          .maxDepth = trained.maxDepth};
 }
 
 }  // namespace
@@ -41,7 +43,7 @@ std::vector<std::byte> encodeIllumination(const TrainedIllumination& trained, co
   info.toolVersion = LOBE_VERSION;
   info.scene = nameOf(sceneFile);
   info.sceneHash = lightHash(scene);
-  info.settings = settingsOf(plan, trained.report);
+  info.settings = settingsOf(plan, trained);
   info.particles = trained.report.particles();
   info.undersampledFraction = trained.report.undersampledFraction;
   return storeIllumination(cacheOf(trained.field), std::move(info));
@@ -59,6 +61,7 @@ TrainedIllumination restoreIllumination(const IlluminationFile& file, const std:
   trained.field = fieldOf(loadIllumination(file));
   trained.report.undersampledFraction = info.undersampledFraction;
   trained.report.learntFractions = info.settings.learntFractions;
+  trained.maxDepth = info.settings.maxDepth;
   return trained;
 }
 

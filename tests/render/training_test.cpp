@@ -2,6 +2,7 @@
 // with closed forms.
 
 #include <functional>
+#include <limits>
 #include <vector>
 
 #include "materials/registry.h"
@@ -16,13 +17,14 @@ using namespace lobe::test;
 namespace {
 
 constexpr float kAlbedo = 0.5f;
+constexpr int kUnlimited = std::numeric_limits<int>::max();
 
 /// The bin of a particle; negative if none.
 using Binning = std::function<int(const Particle&)>;
 
 /// Flux per bin; each photon is one estimate.
 std::vector<Moments> photonFlux(const RenderScene& scene, const GuidedSampler& importance, int count,
-                                std::uint64_t seed, int bins, const Binning& binOf) {
+                                std::uint64_t seed, int bins, const Binning& binOf, int maxDepth = kUnlimited) {
   std::vector<Moments> moments(bins);
   for (int i = 0; i < count; ++i) {
     Sampler rng(seed, 0, i);
@@ -30,7 +32,7 @@ std::vector<Moments> photonFlux(const RenderScene& scene, const GuidedSampler& i
     const Vec2 u1 = rng.uniform2();
     PhotonResult result;
     if (const auto photon = scene.lights.samplePhoton(choice, u1, rng.uniform2()))
-      PhotonWalk(scene, importance, rng, result).run(*photon, static_cast<std::uint64_t>(i));
+      PhotonWalk(scene, importance, rng, result, maxDepth).run(*photon, static_cast<std::uint64_t>(i));
     std::vector<double> flux(bins);
     for (const Particle& p : dataOf(result.radiance).photons)
       if (const int bin = binOf(p); bin >= 0) flux[bin] += p.weight;
@@ -62,14 +64,14 @@ struct Patch {
 /// Flux on the patch per bin from camera paths that start on it: L cosθ divided by the density of the direction, times
 /// the area.
 std::vector<Moments> pathFlux(const RenderScene& scene, const GuidedSampler& sampler, const Patch& patch, int count,
-                              std::uint64_t seed) {
+                              std::uint64_t seed, int maxDepth = kUnlimited) {
   std::vector<Moments> moments(Patch::kRings * Patch::kSectors);
   const ImportonWishes wishes{false, false, true};
   for (int i = 0; i < count; ++i) {
     Sampler rng(seed, 0, i);
     const Vec2 u = patch.half * (2 * rng.uniform2() - Vec2::Ones());
     ImportonResult result;
-    ImportonWalk(scene, sampler, wishes, rng, result).run({Vec3(u.x(), 0.01f, u.y()), -Vec3::UnitY()}, 0);
+    ImportonWalk(scene, sampler, wishes, rng, result, maxDepth).run({Vec3(u.x(), 0.01f, u.y()), -Vec3::UnitY()}, 0);
     const std::vector<Particle>& samples = dataOf(result.radiance).samples;
     // Paths may return to the patch, but only first vertices are uniform on it.
     const bool found = !samples.empty() && (samples[0].position - Vec3(u.x(), 0, u.y())).norm() < 1e-4f;
@@ -222,6 +224,75 @@ TEST_CASE("training: all estimators agree with the closed form in an integrating
     excess.add(sum - irradiance * static_cast<double>(dataOf(result.radiance).requests.size()));
   }
   CHECK(std::abs(excess.mean()) < kMaxDeviation * excess.error());
+}
+
+TEST_CASE("training: learns the light of the paths of the picture, and not that of longer ones") {
+  const float radius = 2, intensity = 3;
+  Scene scene;
+  addShape(scene, Sphere{{0, 0, 0}, radius, true}, addMaterial(scene, std::make_shared<Diffuse>(kAlbedo)));
+  scene.lights.push_back(PointLight{{0, 0, 0}, grey(intensity)});
+  const RenderScene ready(scene);
+  const Unguided unguided(scene);
+  const Ray ray{Vec3::Zero(), Vec3::UnitX()};
+  PathOptions options;
+  options.maxDepth = GENERATE(1, 2, 3, 5);
+  // At the first vertex of the paths, without direct light, which only next-event estimation samples.
+  const double direct = options.maxDepth < 2 ? 0 : intensity / (radius * radius);
+  double irradiance = 0;
+  for (int bounces = 1; bounces <= options.maxDepth - 2; ++bounces) irradiance += direct * std::pow(kAlbedo, bounces);
+  CHECK(estimate(PathIntegrator(ready, options), ray, 100).mean() ==
+        Approx(kAlbedo * kInvPi * (direct + irradiance)).epsilon(0.01));
+  const auto equals = [](const Moments& moments, double expected) {
+    UNSCOPED_INFO(moments.mean() << " +- " << moments.error() << ", expected " << expected);
+    return std::abs(moments.mean() - expected) <= kMaxDeviation * moments.error();
+  };
+  const auto flux = photonFlux(
+      ready, unguided.sampler, 20000, 1, 1, [](const Particle&) { return 0; }, options.maxDepth);
+  CHECK(equals(flux[0], irradiance * 4 * kPi * radius * radius));
+  Moments found;
+  for (int i = 0; i < 20000; ++i) {
+    Sampler rng(2, 0, i);
+    ImportonResult result;
+    ImportonWalk(ready, unguided.sampler, {false, false, true}, rng, result, options.maxDepth).run(ray, 0);
+    double atFirst = 0;
+    for (const Particle& p : dataOf(result.radiance).samples)
+      if ((p.position - Vec3(radius, 0, 0)).norm() < 1e-3f) atFirst += p.weight;
+    found.add(atFirst);
+    CHECK(std::ssize(dataOf(result.radiance).requests) < options.maxDepth);
+  }
+  CHECK(equals(found, irradiance));
+}
+
+TEST_CASE("training: camera paths and photons agree on the light of paths of limited length") {
+  Scene scene = roomScene();
+  SECTION("of two reflections") {}
+  SECTION("via a half mirror") {
+    const int mirror = addMaterial(scene, std::make_shared<HalfMirror>(0.4f, 0.5f, 0.5f));
+    addShape(scene, Sphere{{-1.2f, 2.6f, 0.4f}, 0.35f}, mirror);
+  }
+  SECTION("through smooth water") {
+    addShape(scene, rectangle({-2, 1, -2}, {0, 0, 4}, {4, 0, 0}), addMaterial(scene, dielectric("dielectric")));
+  }
+  const RenderScene ready(scene);
+  const Unguided unguided(scene);
+  const Patch patch;
+  const int maxDepth = 4;
+  const auto photons = photonFlux(
+      ready, unguided.sampler, 100000, 1, Patch::kRings * Patch::kSectors,
+      [&](const Particle& p) { return patch.bin(p); }, maxDepth);
+  CHECK(agree(photons, pathFlux(ready, unguided.sampler, patch, 60000, 2, maxDepth)));
+}
+
+TEST_CASE("training: nothing is learnt for pictures of emitters alone") {
+  const Scene scene = roomScene();
+  const RenderScene ready(scene);
+  TrainingPlan plan;
+  plan.passes = 1;
+  plan.photons = plan.importons = 100;
+  plan.maxDepth = 1;
+  const TrainedIllumination trained = trainIllumination(ready, roomCamera(), nullptr, plan);
+  CHECK(trained.report.particles() == 0);
+  CHECK(trained.field.records() == 0);
 }
 
 namespace {

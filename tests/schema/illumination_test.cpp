@@ -23,7 +23,7 @@ struct Content {
 
 Content smallFile() {
   Content c;
-  c.info = {"0.1.0", "house/scene.xml", 0x0123456789abcdef, {"photons", 3, 1000, 500, 8, 7, true}, 2500, 0.25, 0.5f};
+  c.info = {"0.1.0", "house/scene.xml", 0x0123456789abcdef, {"photons", 3, 1000, 500, 8, 7, true, 6}, 2500, 0.25, 0.5f};
   c.records = {{{1, 2, 3}, {0, 0, 1}, {1, 0, 0}, 0.5f, 0.25f, 3.5f, 100, 0.3f, 0, 2},
                {{-1, 0, 5}, {0, 1, 0}, {0, 0, -1}, 0.125f, 1.0f, 0, 0, 0.9f, 2, 0}};
   c.components = {{0.25f, -0.1f, 0.3f, 0.02f, 0.0f, 0.05f}, {0.75f, 0.4f, -0.2f, 0.01f, -0.005f, 0.06f}};
@@ -171,6 +171,7 @@ TEST_CASE("schema: invalid values in illumination files are rejected") {
       {"unit of length", [&](Content& c) { c.info.unit = infinity; }},
       {"unit of length", [](Content& c) { c.info.unit = c.records[0].radius = c.records[1].radius = 1e-40f; }},
       {"undersampled", [](Content& c) { c.info.undersampledFraction = -1; }},
+      {"length of paths", [](Content& c) { c.info.settings.maxDepth = -1; }},
   };
   for (const Fault& fault : faults) {
     Content content = smallFile();

@@ -128,6 +128,34 @@ TEST_CASE("loberender: training goes on from stored illumination, which the new 
   }
 }
 
+TEST_CASE("loberender: illumination is trained for the maximum path length of the picture") {
+  const SceneFolder folder(false);
+  const std::string guided = " --integrator guided", note = "a.illum: trained for paths of up to 3 segments";
+  const auto depthOf = [&](const std::string& name) {
+    return parseJson(folder.run("lobedump --json " + name).out).at(0).at("settings").at("max_depth");
+  };
+  REQUIRE(folder.run(kSave + guided).code == 0);
+  CHECK(depthOf("a.illum").is_null());
+  const std::string unlimited = folder.bytes("a.illum");
+  REQUIRE(folder.run(kSave + guided + " --max-depth 3").code == 0);
+  CHECK(depthOf("a.illum") == 3);
+  CHECK(folder.bytes("a.illum") != unlimited);
+  CHECK_THAT(folder.run("lobedump a.illum").out, Catch::Contains("paths of up to 3 segments"));
+
+  const std::string use = "loberender scene.xml --spp 1 -o a.exr --illumination a.illum" + guided;
+  CHECK_THAT(folder.run(use).error, Catch::Contains(note));
+  CHECK_THAT(folder.run(use + " --max-depth 3").error, !Catch::Contains(note));
+  REQUIRE(folder.run(use + kTraining + " --save-illumination b.illum").code == 0);
+  CHECK(depthOf("b.illum") == 3);
+
+  std::string text = kScene;
+  const std::string integrator = R"(<integrator type="path"><integer name="maxDepth" value="3"/></integrator>)";
+  folder.write("scene.xml", text.insert(text.find("<sensor"), integrator));
+  const std::string limited = folder.bytes("a.illum");
+  REQUIRE(folder.run(kSave + guided).code == 0);
+  CHECK(folder.bytes("a.illum") == limited);
+}
+
 TEST_CASE("loberender: the sensor can come from another file") {
   const SceneFolder folder(false);
   const std::string path = " --integrator path --spp 2 ";

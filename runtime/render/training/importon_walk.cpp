@@ -1,11 +1,13 @@
 #include "runtime/render/training/importon_walk.h"
 
+#include <algorithm>
+
 namespace lobe {
 void ImportonWalk::run(const Ray& cameraRay, std::uint64_t index) {
   recorder_.begin(index);
   result_.importance.beginPath(index);
   state_ = {cameraRay, Rgb::Ones()};
-  for (depth_ = 1; depth_ <= kMaxTrainingDepth; ++depth_)
+  for (depth_ = 1; depth_ <= std::min(kMaxTrainingDepth, maxDepth_); ++depth_)
     if (!advance()) break;
   recorder_.end();
 }
@@ -20,7 +22,7 @@ bool ImportonWalk::advance() {
     return false;
   }
   if (hit->emitter) collect(state_.weight * emittedRadiance(*hit) * emissionWeight_.ofSurface(*hit));
-  if (!hit->bsdf || !sidesAgree(*hit, hit->woWorld, hit->wo)) return false;
+  if (!hit->bsdf || depth_ >= maxDepth_ || !sidesAgree(*hit, hit->woWorld, hit->wo)) return false;
 
   const float delta = hit->bsdf->deltaProbability(hit->wo, hit->uv);
   if (delta >= 1) return goOn(*hit, nullptr);
@@ -74,7 +76,7 @@ void ImportonWalk::addDirectLight(const SurfaceHit& hit, const GuidedSampler::Ve
   const Rgb value = state_.weight * evalBsdf(hit, wi) * (std::abs(wi.z()) / light->pdf);
   if (!usable(luminance(value))) return;
   const float weight = light->delta ? 1.0f : misWeight(light->pdf, smoothFraction * vertex.pdf(wi));
-  const ArrivingLight arriving = scene_.arriving(hit, *light, kMaxTrainingDepth);
+  const ArrivingLight arriving = scene_.arriving(hit, *light, std::min(kMaxTrainingDepth, maxDepth_ - depth_ - 1));
   const Rgb found = value * weight * arriving.radiance;
   collect(found);
   // Where photons of this light enter the scene. Light at the first surface is left to the renderer's next-event

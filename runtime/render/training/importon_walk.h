@@ -3,6 +3,7 @@
 // importance that arrives at surfaces, and the incident radiance that the path finds.
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "lobe/path_recorder.h"
@@ -35,14 +36,15 @@ struct ImportonWishes {
 
 class ImportonWalk {
  public:
-  /// All references must outlive the walk, which appends to the result.
+  /// All references must outlive the walk, which appends to the result. maxDepth: PathOptions::maxDepth of the picture.
   ImportonWalk(const RenderScene& scene, const GuidedSampler& sampler, const ImportonWishes& wishes, Sampler& rng,
-               ImportonResult& result)
+               ImportonResult& result, int maxDepth = std::numeric_limits<int>::max())
       : scene_(scene),
         sampler_(sampler),
         wishes_(wishes),
         rng_(rng),
         result_(result),
+        maxDepth_(maxDepth),
         recorder_(result.radiance, {wishes.samples, wishes.fractions}) {}
 
   /// index: number of the path, passed to the sample storages.
@@ -63,6 +65,7 @@ class ImportonWalk {
   const ImportonWishes wishes_;
   Sampler& rng_;
   ImportonResult& result_;
+  const int maxDepth_;
 
   ParticleState state_;
   int depth_ = 0;

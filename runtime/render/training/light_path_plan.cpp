@@ -137,11 +137,11 @@ double LightPathTrial::inefficiencyWithLight() const {
   return (std::max(variance, secondMoment) - secondMoment + secondMomentLeft) * costWithLight;
 }
 
-EnvironmentGuide learnEnvironmentGuide(const RenderScene& scene, const RayCamera& camera, const GuidedSampler& guide,
-                                       int paths, std::uint64_t seed) {
+EnvironmentGuide learnEnvironmentGuide(const RenderScene& scene, const RayCamera& camera, const PathOptions& options,
+                                       const GuidedSampler& guide, int paths, std::uint64_t seed) {
   ImportonWishes wishes;
   wishes.uses = true;
-  const ParticleTracer tracer(scene, camera, guide, guide, nullptr, seed ^ kTag);
+  const ParticleTracer tracer(scene, camera, guide, guide, nullptr, seed ^ kTag, options.maxDepth);
   EnvironmentGuide learnt(scene.lights);
   for (const EnvironmentUse& use : tracer.traceImportons(0, paths, wishes).uses)
     learnt.learn(use.point, use.wi, use.weight);

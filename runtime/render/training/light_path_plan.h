@@ -30,8 +30,8 @@ struct LightPathTrial {
 };
 
 /// Learns where photons from the environment should start from camera paths, which the guide samples.
-EnvironmentGuide learnEnvironmentGuide(const RenderScene& scene, const RayCamera& camera, const GuidedSampler& guide,
-                                       int paths, std::uint64_t seed);
+EnvironmentGuide learnEnvironmentGuide(const RenderScene& scene, const RayCamera& camera, const PathOptions& options,
+                                       const GuidedSampler& guide, int paths, std::uint64_t seed);
 
 /// Compares camera paths with and without light paths that start as `emission` says, for the best number of light
 /// paths. paths: number of camera paths and of light paths, > 0. The result does not depend on the number of threads.

@@ -39,13 +39,15 @@ SampleStorage merged(std::vector<Result>& results, SampleStorage Result::*storag
 }  // namespace
 
 ParticleTracer::ParticleTracer(const RenderScene& scene, const RayCamera& camera, const GuidedSampler& radiance,
-                               const GuidedSampler& importance, const EnvironmentGuide* guide, std::uint64_t seed)
+                               const GuidedSampler& importance, const EnvironmentGuide* guide, std::uint64_t seed,
+                               int maxDepth)
     : scene_(scene),
       camera_(camera),
       radiance_(radiance),
       importance_(importance),
       emission_(scene.lights, guide),
-      seed_(seed ^ kTrainingSeed) {}
+      seed_(seed ^ kTrainingSeed),
+      maxDepth_(maxDepth) {}
 
 ImportonResult ParticleTracer::traceImportons(int pass, int count, const ImportonWishes& wishes) const {
   auto results = traceChunks<ImportonResult>(
@@ -54,7 +56,7 @@ ImportonResult ParticleTracer::traceImportons(int pass, int count, const Importo
         const int x = static_cast<int>(pixel.x() * static_cast<float>(camera_.width()));
         const int y = static_cast<int>(pixel.y() * static_cast<float>(camera_.height()));
         const Ray ray = camera_.sample(x, y, rng);
-        ImportonWalk(scene_, radiance_, wishes, rng, result).run(ray, static_cast<std::uint64_t>(i));
+        ImportonWalk(scene_, radiance_, wishes, rng, result, maxDepth_).run(ray, static_cast<std::uint64_t>(i));
       });
   ImportonResult all{merged(results, &ImportonResult::radiance), merged(results, &ImportonResult::importance), {}};
   for (const ImportonResult& result : results) all.uses.insert(all.uses.end(), result.uses.begin(), result.uses.end());
@@ -66,7 +68,7 @@ PhotonResult ParticleTracer::tracePhotons(int pass, int count) const {
   auto results = traceChunks<PhotonResult>(seed_, 2 * static_cast<std::uint64_t>(pass) + 1, count,
                                            [&](int i, Sampler& rng, PhotonResult& result) {
                                              if (const std::optional<EmittedPhoton> photon = emit(rng))
-                                               PhotonWalk(scene_, importance_, rng, result)
+                                               PhotonWalk(scene_, importance_, rng, result, maxDepth_)
                                                    .run(*photon, kFirstPhoton + static_cast<std::uint64_t>(i), count);
                                            });
   return {merged(results, &PhotonResult::radiance), merged(results, &PhotonResult::importance)};

@@ -26,7 +26,7 @@ void PhotonWalk::run(const EmittedPhoton& photon, std::uint64_t index, int photo
   result_.radiance.beginPath(index);
   result_.importance.beginPath(index);
   power_ = luminance(photon.power);
-  if (!usable(power_)) return;
+  if (!usable(power_) || mostSegments_ < 1) return;
   waiting_.push_back({{photon.ray, photon.power}, 1});
   made_ = 0;
   while (!waiting_.empty()) {
@@ -41,16 +41,17 @@ void PhotonWalk::advance(const EmittedPhoton& photon, const Branch& branch) {
   ++result_.segments;
   const std::optional<SurfaceHit> hit = scene_.tracer.trace(branch.state.ray);
   if (!hit || !hit->bsdf || !sidesAgree(*hit, hit->woWorld, hit->wo)) return;
-  if (hit->bsdf->deltaProbability(hit->wo, hit->uv) >= 1) return branchOff(branch, *hit, nullptr);
+  const bool smooth = hit->bsdf->deltaProbability(hit->wo, hit->uv) < 1;
+  if (smooth) store(photon, branch, *hit);
+  if (branch.depth == mostSegments_) return;
+  if (!smooth) return branchOff(branch, *hit, nullptr);
   const GuidedSampler::Vertex vertex(importance_, *hit);
   if (!vertex.distribution().hasRecord())
     result_.importance.requestRecord(asFloats(hit->position), asFloats(normalTowards(*hit)));
-  store(photon, branch, *hit);
   branchOff(branch, *hit, &vertex);
 }
 
 void PhotonWalk::branchOff(Branch branch, const SurfaceHit& hit, const GuidedSampler::Vertex* vertex) {
-  if (branch.depth == kMaxTrainingDepth) return;
   const int branches = applyWeightWindow(branch.state.weight);
   for (int i = 0; i < branches; ++i) {
     const std::optional<Scattered> scattered = scatter(hit, vertex, Transport::flux, rng_);

@@ -1,7 +1,9 @@
 #pragma once
 // The path of a photon in training: it is stored at every surface that it reaches from an emitter.
 
+#include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "lobe/sample_storage.h"
@@ -20,9 +22,14 @@ struct PhotonResult {
 class PhotonWalk {
  public:
   /// All references must outlive the walk, which appends to the result. importance: guides directions by what was
-  /// learnt from importons.
-  PhotonWalk(const RenderScene& scene, const GuidedSampler& importance, Sampler& rng, PhotonResult& result)
-      : scene_(scene), importance_(importance), rng_(rng), result_(result) {}
+  /// learnt from importons. maxDepth: PathOptions::maxDepth of the picture.
+  PhotonWalk(const RenderScene& scene, const GuidedSampler& importance, Sampler& rng, PhotonResult& result,
+             int maxDepth = std::numeric_limits<int>::max())
+      : scene_(scene),
+        importance_(importance),
+        rng_(rng),
+        result_(result),
+        mostSegments_(std::min(kMaxTrainingDepth, maxDepth - 1)) {}
 
   /// index: number of the path, passed to the sample storages.
   /// photons: number of photons of the pass, of which this is one; it makes the flux that is stored independent of it.
@@ -47,6 +54,7 @@ class PhotonWalk {
   const GuidedSampler& importance_;
   Sampler& rng_;
   PhotonResult& result_;
+  const int mostSegments_;  // a path of the picture has at least one more, which begins at the camera
   float fluxScale_ = 1;
   float power_ = 0;  // emitted power, luminance
   std::vector<Branch> waiting_;

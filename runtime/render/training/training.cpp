@@ -73,7 +73,8 @@ class Training {
     if (tracesPhotons && scene.lights.environmentProbability() > 0) guide_.emplace(scene.lights);
     wishes_ = {guide_.has_value(), tracesPhotons, plan.from != TrainFrom::photons,
                plan.learnFractions && caches != nullptr};
-    tracer_.emplace(scene, camera, radianceSampler_, importanceSampler_, guide_ ? &*guide_ : nullptr, plan.seed);
+    tracer_.emplace(scene, camera, radianceSampler_, importanceSampler_, guide_ ? &*guide_ : nullptr, plan.seed,
+                    plan.maxDepth);
   }
   // Tracer and samplers refer to the other members.
   Training(const Training&) = delete;
@@ -186,7 +187,7 @@ TrainedIllumination trainIllumination(const RenderScene& scene, const RayCamera&
   report.seconds = watch.seconds() - deciding;
   report.undersampledFraction = training.radiance().undersampledFraction();
   report.learntFractions = plan.learnFractions && caches != nullptr;
-  TrainedIllumination trained{training.radiance().frozen(), report, {}, {}};
+  TrainedIllumination trained{training.radiance().frozen(), report, {}, {}, plan.maxDepth};
   if (plan.keepImportance) trained.importance = training.importance().frozen();
   if (plan.keepParticles) trained.particles = training.takeParticles();
   return trained;

@@ -2,6 +2,7 @@
 // Trains the illumination field of a scene in several passes.
 
 #include <functional>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -26,6 +27,8 @@ struct TrainingPlan {
   /// depend on the speed of the machine.
   double seconds = kInfinity;
   std::uint64_t seed = 1;
+  /// PathOptions::maxDepth of the picture: the light of longer paths is not learnt.
+  int maxDepth = std::numeric_limits<int>::max();
   /// Records learn BSDF sampling fractions; otherwise, and without caches, that of kProductProbabilities is used.
   bool learnFractions = true;
   bool keepParticles = false;   ///< keep those of the last pass in TrainedIllumination::particles
@@ -58,6 +61,7 @@ struct TrainedIllumination {
   TrainingReport report;
   SampleStorage particles;  ///< of the last pass, if kept
   Field importance;         ///< learnt from importons, if kept; without records if training traces no photons
+  int maxDepth = std::numeric_limits<int>::max();  ///< TrainingPlan::maxDepth, the least of all trainings
 };
 
 /// Called with what has been learnt when the time limit of training is reached. Returns a later limit, or nullopt to
