@@ -374,6 +374,50 @@ TEST_CASE("bidirectional: the image depends on the seed but not on threads or wa
     CHECK((0.5f * (first.pixels[i] + second.pixels[i]) - one.pixels[i]).abs().maxCoeff() < 1e-5f);
 }
 
+TEST_CASE("bidirectional: light paths of the border around the image make no contributions of their own") {
+  Stage stage(sceneWith(std::string(kFloor) + kLamp));
+  const auto traced = [&](const BidirectionalIntegrator& integrator, std::vector<Splat>* splats) {
+    PathStatistics statistics;
+    Rgb sum = Rgb::Zero();
+    for (int i = 0; i < 300; ++i) {
+      Sampler rng(1, 0, i), lightRng(1, 1, i);
+      const Ray ray = stage.camera.sample(i % 20, i / 20, rng);
+      sum += integrator.radiance(ray, rng, lightRng, statistics, splats);
+    }
+    return std::pair(sum, statistics.rays());
+  };
+  const auto check = [&](const BidirectionalIntegrator& integrator) {
+    std::vector<Splat> splats;
+    const auto [inImage, rays] = traced(integrator, &splats);
+    CHECK_FALSE(splats.empty());
+    const auto [inBorder, fewer] = traced(integrator, nullptr);
+    CHECK((inImage == inBorder).all());
+    CHECK(fewer < rays);
+  };
+  check(stage.bdpt());
+  check(stage.pathWithLight());
+}
+
+TEST_CASE("bidirectional: the light image has one light path for each pixel, and none of the border") {
+  class Counting : public BidirectionalIntegrator {
+   public:
+    Rgb radiance(const Ray&, Sampler&, Sampler&, PathStatistics&, std::vector<Splat>* splats) const override {
+      ++(splats ? inImage : inBorder);
+      return Rgb::Zero();
+    }
+    mutable std::atomic<int> inImage = 0, inBorder = 0;
+  };
+  Camera camera;
+  camera.width = 40, camera.height = 30;
+  Film film(40, 30);
+  RenderOptions options;
+  options.samples = 1;
+  Counting integrator;
+  render(RayCamera(camera, PixelFilter{PixelFilter::Kind::tent, 1.0f}), integrator, film, options);
+  CHECK(integrator.inImage.load() == 40 * 30);
+  CHECK(integrator.inBorder.load() == 42 * 32 - 40 * 30);
+}
+
 namespace {
 
 /// Sets the flag after a number of camera paths, like a signal at a random moment.
@@ -382,7 +426,7 @@ class Stopping : public Inner {
  public:
   Stopping(const Inner& inner, int paths, StopFlag& flag) : Inner(inner), left_(paths), flag_(flag) {}
   Rgb radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
-               std::vector<Splat>& splats) const override {
+               std::vector<Splat>* splats) const override {
     if (--left_ == 0) flag_ = 1;
     return Inner::radiance(ray, rng, lightRng, statistics, splats);
   }
@@ -570,7 +614,7 @@ class WrongBdpt : public BidirectionalIntegrator {
  public:
   WrongBdpt(const Stage& stage, float camera, float light) : stage_(stage), camera_{camera}, light_{light} {}
   Rgb radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
-               std::vector<Splat>& splats) const override {
+               std::vector<Splat>* splats) const override {
     return BidirectionalPaths(stage_.ready, stage_.camera, stage_.options, camera_, light_)
         .radiance(ray, rng, lightRng, statistics, splats);
   }

@@ -23,7 +23,7 @@ class PathWithLight : public BidirectionalIntegrator {
         cameraGuide_(cameraGuide),
         lightGuide_(lightGuide) {}
   Rgb radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
-               std::vector<Splat>& splats) const override {
+               std::vector<Splat>* splats) const override {
     return radianceWithLightPaths(scene_, camera_, options_, cameraGuide_, lightGuide_, tracing_, ray, rng, lightRng,
                                   statistics, splats);
   }

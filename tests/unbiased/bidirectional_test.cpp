@@ -70,7 +70,7 @@ class WrongBdpt : public BidirectionalIntegrator {
   WrongBdpt(const Studio& studio, float camera, float light)
       : studio_(studio), camera_{studio.productSampler(), camera}, light_{studio.importanceSampler(), light} {}
   Rgb radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
-               std::vector<Splat>& splats) const override {
+               std::vector<Splat>* splats) const override {
     return BidirectionalPaths(studio_.renderScene(), studio_.camera(), options_, camera_, light_)
         .radiance(ray, rng, lightRng, statistics, splats);
   }

@@ -8,7 +8,7 @@ namespace lobe {
 
 template <class CameraGuide, class LightGuide>
 Rgb Bdpt<CameraGuide, LightGuide>::radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
-                                            std::vector<Splat>& splats) const {
+                                            std::vector<Splat>* splats) const {
   return BidirectionalPaths(scene_, camera_, options_, cameraGuide_, lightGuide_)
       .radiance(ray, rng, lightRng, statistics, splats);
 }
@@ -17,7 +17,7 @@ template class Bdpt<BsdfSampler, BsdfSampler>;
 template class Bdpt<const GuidedSampler&, const GuidedSampler&>;
 
 Rgb GuidedLightIntegrator::radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
-                                    std::vector<Splat>& splats) const {
+                                    std::vector<Splat>* splats) const {
   return radianceWithLightPaths(scene_, camera_, options_, guide_, BsdfSampler(), tracing_, ray, rng, lightRng,
                                 statistics, splats);
 }
@@ -32,7 +32,7 @@ void VcmIntegrator::storeLightPath(Sampler& lightRng, PathStatistics& statistics
 }
 
 Rgb VcmIntegrator::radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
-                            std::vector<Splat>& splats) const {
+                            std::vector<Splat>* splats) const {
   const BsdfSampler sampler;
   BidirectionalPaths paths(scene_, camera_, options_, sampler, sampler);
   paths.mergeWith(*grid_);

@@ -16,7 +16,7 @@ class Bdpt : public BidirectionalIntegrator {
        LightGuide lightGuide = {})
       : scene_(scene), camera_(camera), options_(options), cameraGuide_(cameraGuide), lightGuide_(lightGuide) {}
   Rgb radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
-               std::vector<Splat>& splats) const override;
+               std::vector<Splat>* splats) const override;
 
  private:
   const RenderScene& scene_;
@@ -38,7 +38,7 @@ class GuidedLightIntegrator : public BidirectionalIntegrator {
                         const GuidedSampler& guide, const LightTracing& tracing)
       : scene_(scene), camera_(camera), options_(options), guide_(guide), tracing_(tracing) {}
   Rgb radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
-               std::vector<Splat>& splats) const override;
+               std::vector<Splat>* splats) const override;
 
  private:
   const RenderScene& scene_;
@@ -70,7 +70,7 @@ class VcmIntegrator : public BidirectionalIntegrator {
   void storeLightPath(Sampler& lightRng, PathStatistics& statistics, std::vector<Photon>& photons) const override;
   void mergeWith(const std::vector<Photon>& photons) override { grid_.emplace(photons, current_); }
   Rgb radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
-               std::vector<Splat>& splats) const override;
+               std::vector<Splat>* splats) const override;
 
  private:
   const RenderScene& scene_;

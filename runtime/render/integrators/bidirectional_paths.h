@@ -61,11 +61,11 @@ class BidirectionalPaths {
 
   /// See BidirectionalIntegrator.
   Rgb radiance(const Ray& cameraRay, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
-               std::vector<Splat>& splats) const {
+               std::vector<Splat>* splats) const {
     ++statistics.paths;
     Sample sample{rng, statistics};
     traceLightPath(lightRng, statistics, sample.light);
-    connectToCamera(sample.light, statistics, splats);
+    if (splats) connectToCamera(sample.light, statistics, *splats);
     traceCameraPath(sample, cameraRay);
     return sample.found.limited(options_.fireflyLimit, statistics.cut);
   }
@@ -522,10 +522,10 @@ template <class CameraGuide, class LightGuide>
 Rgb radianceWithLightPaths(const RenderScene& scene, const RayCamera& camera, const PathOptions& options,
                            const CameraGuide& cameraGuide, const LightGuide& lightGuide, const LightTracing& tracing,
                            const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
-                           std::vector<Splat>& splats) {
+                           std::vector<Splat>* splats) {
   BidirectionalPaths paths(scene, camera, options, cameraGuide, lightGuide);
-  for (double left = tracing.pathsPerPixel - lightRng.uniformDouble(); left > 0; left -= 1)
-    paths.traceLight(tracing, lightRng, statistics, splats);
+  for (double left = splats ? tracing.pathsPerPixel - lightRng.uniformDouble() : 0; left > 0; left -= 1)
+    paths.traceLight(tracing, lightRng, statistics, *splats);
   return PathLoop(scene, options, cameraGuide, LightPaths(scene, camera, lightGuide, tracing))
       .radiance(ray, rng, statistics);
 }

@@ -82,9 +82,11 @@ class BidirectionalIntegrator {
 
   /// One camera ray and one light path, which lightRng determines. An unbiased estimate of the sum of the radiance
   /// along all camera rays of a sample of the image, one per pixel, if the splats are added to it (LightImage). The ray
-  /// must be from the camera with which the integrator was made. Called concurrently from many threads.
+  /// must be from the camera with which the integrator was made. splats: nullptr if the ray is of the border around the
+  /// image, whose light paths do not belong to the light image; the radiance is the same. Called concurrently from many
+  /// threads.
   virtual Rgb radiance(const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
-                       std::vector<Splat>& splats) const = 0;
+                       std::vector<Splat>* splats) const = 0;
 };
 
 }  // namespace lobe

@@ -291,9 +291,8 @@ class BidirectionalSamples {
         sample.forEachPixel([&](int x, int y, int tile, Sampler& rng, Sampler& lightRng, PathStatistics& counts) {
           const CameraSample place = filter_ ? camera_.sample(offset, rng) : camera_.sample(rng);
           // The light image is of one light path per pixel; that of the border serves its camera path alone.
-          std::vector<Splat> unused;
-          fromCamera_.at(x, y) = integrator_.radiance(camera_.rayThrough(x, y, place), rng, lightRng, counts,
-                                                      isInImage(camera_, x, y) ? splats_[tile] : unused);
+          std::vector<Splat>* const splats = isInImage(camera_, x, y) ? &splats_[tile] : nullptr;
+          fromCamera_.at(x, y) = integrator_.radiance(camera_.rayThrough(x, y, place), rng, lightRng, counts, splats);
         });
     fromLights_.sum(splats_);
     if (filter_) filter_->apply(fromCamera_, offset);
