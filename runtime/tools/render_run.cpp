@@ -266,6 +266,7 @@ RenderOptions Run::options() {
     options.longestWave = every;
   options.stop = &stop_;
   options.withWave = [this] { addFeatures(); };
+  options.onFailure = [this](const RenderResult& result) { result_ = result; };
   return options;
 }
 

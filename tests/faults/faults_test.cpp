@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <variant>
 #include <vector>
@@ -13,12 +14,14 @@
 #include "fitter/compile.h"
 #include "runtime/core/parallel.h"
 #include "runtime/core/stop.h"
+#include "runtime/image/aov.h"
 #include "runtime/image/image.h"
 #include "runtime/image/image_output.h"
 #include "runtime/tools/render_run.h"
 #include "scenes/mitsuba/reader.h"
 #include "scenes/scene_lobes.h"
 #include "tests/faults/injection.h"
+#include "tests/support/json.h"
 #include "tests/support/loberender_test_tools.h"
 
 namespace {
@@ -40,6 +43,10 @@ RenderJob jobIn(const fs::path& folder) {
   job.training.photons = 300;
   job.training.importons = 150;
   return job;
+}
+
+bool equal(const Image& a, const Image& b) {
+  return std::ranges::equal(a.pixels, b.pixels, [](const Rgb& x, const Rgb& y) { return (x == y).all(); });
 }
 
 /// A kind of render: what it changes in the job of quickJobIn.
@@ -149,26 +156,48 @@ TEST_CASE("faults: an allocation that fails while rendering does not lose the sa
   RenderJob job = jobIn(folder.path());
   job.integrator = IntegratorKind::path;
   job.saveIllumination.clear();
+  job.aovs = {Aov::albedo};
+  job.stats = folder / "s.json";
   job.samples = 64;
   const StopFlag never = 0;
   const fs::path picture = folder / "out" / "a.exr";
   fs::create_directory(folder / "out");
+  std::map<int, Image> albedos;
+  const auto albedoOf = [&](int samples) -> const Image& {
+    const auto [found, isNew] = albedos.try_emplace(samples);
+    if (isNew) {
+      RenderJob whole = job;
+      whole.outputs = {folder / "whole.exr"};
+      whole.samples = samples;
+      run(whole, never);
+      found->second = readAovs(folder / "whole.exr").at(Aov::albedo);
+    }
+    return found->second;
+  };
   {
     const Injection counted(allocations, 0);
     run(job, never);
   }
   const long calls = allocations.calls;
   int rescued = 0;
-  for (long n = calls; n > 0; n -= 1 + calls / 60) {
+  for (long n = calls; n > 0; n -= 1 + calls / 150) {
     fs::remove(picture);
+    fs::remove(job.stats);
     try {
       const Injection injection(allocations, n);
       run(job, never);
     } catch (const std::exception&) {
       if (!fs::exists(picture)) continue;
+      CAPTURE(n, calls);
       CHECK(readImage(picture).width == 16);
       const ImageAttributes all = readAttributes(picture);
       rescued += all.contains("interrupted") || std::get<double>(all.at("samples")) < 64;
+      if (!all.contains("samples") || !fs::exists(job.stats)) continue;
+      // The statistics and the features are those of the samples of the picture.
+      const int samples = static_cast<int>(std::get<double>(all.at("samples")));
+      CHECK(parseJson(readFile(job.stats)).at("spp") == samples);
+      const Aovs aovs = readAovs(picture);
+      if (aovs.contains(Aov::albedo)) CHECK(equal(aovs.at(Aov::albedo), albedoOf(samples)));
     }
   }
   CHECK(rescued > 0);

@@ -6,6 +6,8 @@
 #include <cstring>
 #include <functional>
 #include <limits>
+#include <optional>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -191,6 +193,29 @@ TEST_CASE("sample grid: the image depends neither on threads nor on where it is 
     CHECK(sameFilm(part, whole));
   }
   CHECK(uneven > 2);
+}
+
+TEST_CASE("sample grid: if rendering fails, the result is that of the samples of the film") {
+  constexpr int kPoints = (kWidth + 4) * (kHeight + 4);
+  std::atomic<int> calls = 0;
+  // After half of the last wave, which has two parts.
+  const Pattern failing([&](const Vec3&, Sampler&) {
+    if (++calls > 48 * kPoints) throw std::runtime_error("no memory");
+    return Rgb(1, 1, 1);
+  });
+  RenderOptions options = optionsOf(64, PixelFiltering::splatting);
+  std::optional<RenderResult> last, failed;
+  options.onFailure = [&](const RenderResult& result) { failed = result; };
+  const auto afterWave = [&](const RenderResult& result) { last = result; };
+  const RayCamera camera = cameraWith(kFilters[1]);
+  Film film(kWidth, kHeight);
+  CHECK_THROWS_WITH(render(camera, failing, film, options, afterWave), "no memory");
+  const auto [least, most] = film.sampleRange();
+  REQUIRE((least == most && last && failed));
+  CHECK(failed->total.samples == static_cast<int>(least));
+  CHECK(failed->statistics.paths == least * kPoints);
+  CHECK(failed->total.samples >= last->total.samples);
+  CHECK(failed->total.seconds > last->total.seconds);
 }
 
 TEST_CASE("sample grid: parts of the samples add up to the whole") {

@@ -134,10 +134,10 @@ class WaveRenderer {
       : addSample_(addSample), film_(film), stop_(options.stop), tiles_(camera, options, 0) {}
 
   /// Adds to every pixel the samples that it lacks to have `samples` of them.
-  Wave render(int samples) {
-    return tiles_.render(
-        [&] { return isSet(stop_); },
-        [&](int x, int y, int, PathStatistics& statistics) { renderPixel(x, y, samples, statistics); });
+  void render(int samples, Wave& wave) {
+    wave =
+        tiles_.render([&] { return isSet(stop_); },
+                      [&](int x, int y, int, PathStatistics& statistics) { renderPixel(x, y, samples, statistics); });
   }
 
  private:
@@ -168,8 +168,7 @@ class GridRenderer {
 
   /// Adds to every pixel the samples that it lacks to have `samples` of them. The statistics are those of the samples
   /// that all pixels have in the end, because samples of which a part is missing are rendered again later.
-  Wave render(int samples) {
-    Wave wave;
+  void render(int samples, Wave& wave) {
     for (int done = static_cast<int>(film_.sampleRange().first); done < samples && wave.complete;) {
       const int count = std::min(samples - done, mostGrids());
       const Wave part = renderGrids(done, count);
@@ -178,7 +177,6 @@ class GridRenderer {
       if (part.complete) wave.statistics += part.statistics;
       done += count;
     }
-    return wave;
   }
 
  private:
@@ -228,14 +226,12 @@ class ImageRenderer {
       : camera_(camera), addSample_(addSample), film_(film), options_(options), tiles_(camera, options, border) {}
 
   /// Adds samples until every pixel has `samples` of them.
-  Wave render(int samples) {
-    Wave wave;
+  void render(int samples, Wave& wave) {
     for (int s = static_cast<int>(film_.sampleRange().first); s < samples; ++s) {
       wave.complete = !isSet(options_.stop);
       if (!wave.complete) break;
       wave.statistics += addSample_(OneSample(camera_, tiles_, options_, s));
     }
-    return wave;
   }
 
  private:
@@ -372,6 +368,7 @@ Sampler RenderOptions::sampler(std::uint64_t pixel, int s) const {
 
 namespace {
 
+/// renderer.render adds its statistics to a wave. If it throws, those of the parts that were completed are in the wave.
 template <class Renderer>
 RenderResult renderWaves(Renderer renderer, const Film& film, const RenderOptions& options, const AfterWave& afterWave,
                          const RenderResult& before) {
@@ -382,11 +379,21 @@ RenderResult renderWaves(Renderer renderer, const Film& film, const RenderOption
   result.stopped = false;
   while (const int samples = plan.next(progress)) {
     const Stopwatch watch;
-    const Wave wave = renderer.render(progress.samples + samples);
-    if (options.withWave) options.withWave();
-    result.statistics += wave.statistics;
-    progress.seconds += watch.seconds();
-    progress.samples = static_cast<int>(film.sampleRange().first);
+    Wave wave;
+    const auto addWave = [&] {
+      result.statistics += wave.statistics;
+      progress.seconds += watch.seconds();
+      progress.samples = static_cast<int>(film.sampleRange().first);
+    };
+    try {
+      renderer.render(progress.samples + samples, wave);
+      if (options.withWave) options.withWave();
+    } catch (...) {
+      addWave();
+      if (options.onFailure) options.onFailure(result);
+      throw;
+    }
+    addWave();
     result.stopped = !wave.complete;
     if (result.stopped) break;
     if (afterWave) afterWave(result);

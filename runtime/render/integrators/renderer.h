@@ -26,6 +26,8 @@ enum class PixelFiltering {
   importance
 };
 
+struct RenderResult;
+
 /// Exactly one of samples and seconds is set.
 struct RenderOptions {
   std::uint64_t seed = 1;
@@ -39,6 +41,9 @@ struct RenderOptions {
   /// Called after the samples of each wave, also of one that was stopped, while no thread writes to the film; empty:
   /// not used. Its time is part of the rendering time.
   std::function<void()> withWave = {};
+  /// Called with the result so far if rendering fails, before the exception is passed on; empty: not used. Its
+  /// statistics may lack those of the last samples of the film.
+  std::function<void(const RenderResult&)> onFailure = {};
 
   /// The random numbers of sample s, counted from firstSample, of a pixel, counted row by row from the top; with
   /// splatting, among the pixels of the image and its border.
