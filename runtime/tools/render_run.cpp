@@ -331,11 +331,12 @@ Image Run::imageOf(Aov aov) const {
 void Run::writeOutputs(OutputErrors& errors) const {
   const RunResult result{result_, guiding_, film()};
   for (const auto& output : job_.outputs) errors.attempt(output, [&] { writePicture(output, result); });
+  writeCheckpoint(errors);
   errors.attempt(job_.convergence, [&] { log_->write(); });
+  // Last, because the JSON library ends the program if it runs out of memory while it frees an object.
   if (!job_.stats.empty())
     errors.attempt(job_.stats,
                    [&] { writeAtomically(job_.stats, jsonText(statistics(job_, sceneHash_, load_, result)) + "\n"); });
-  writeCheckpoint(errors);
 }
 
 void Run::writePicture(const std::filesystem::path& output, const RunResult& result) const {

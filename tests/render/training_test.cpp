@@ -278,9 +278,9 @@ TEST_CASE("training: camera paths and photons agree on the light of paths of lim
   const Patch patch;
   const int maxDepth = 4;
   const auto photons = photonFlux(
-      ready, unguided.sampler, 100000, 1, Patch::kRings * Patch::kSectors,
+      ready, unguided.sampler, 1000000, 1, Patch::kRings * Patch::kSectors,
       [&](const Particle& p) { return patch.bin(p); }, maxDepth);
-  CHECK(agree(photons, pathFlux(ready, unguided.sampler, patch, 60000, 2, maxDepth)));
+  CHECK(agree(photons, pathFlux(ready, unguided.sampler, patch, 600000, 2, maxDepth)));
 }
 
 TEST_CASE("training: nothing is learnt for pictures of emitters alone") {
