@@ -145,7 +145,7 @@ TEST_CASE("faults: whichever allocation of a render fails") {
   CHECK(injectInto(allocations, "auto", jobIn(folder.path())) > 50);
 }
 
-TEST_CASE("faults: whichever task of a render fails", "[slow]") {
+TEST_CASE("faults: whichever task of a render fails") {
   const SceneFolder folder(true);
   CHECK(injectInto(tasks, "auto", jobIn(folder.path())) > 10);
 }
@@ -209,11 +209,11 @@ TEST_CASE("faults: whichever write or read of any kind of render fails") {
   for (Countdown* countdown : {&writes, &reads}) injectIntoAll(*countdown, SceneFolder(true));
 }
 
-TEST_CASE("faults: whichever allocation of any kind of render fails", "[slow]") {
+TEST_CASE("faults: whichever allocation of any kind of render fails") {
   injectIntoAll(allocations, SceneFolder(true));
 }
 
-TEST_CASE("faults: whichever task of any kind of render fails", "[slow]") {
+TEST_CASE("faults: whichever task of any kind of render fails") {
   injectIntoAll(tasks, SceneFolder(true));
 }
 

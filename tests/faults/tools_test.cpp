@@ -142,6 +142,6 @@ TEST_CASE("faults: whichever write or read of lobedump fails") {
   for (Countdown* countdown : {&writes, &reads}) injectIntoDumps(*countdown);
 }
 
-TEST_CASE("faults: whichever allocation of lobedump fails", "[slow]") {
+TEST_CASE("faults: whichever allocation of lobedump fails") {
   injectIntoDumps(allocations);
 }
