@@ -110,9 +110,9 @@ HWY_EXPORT(sumKernel);
 }  // namespace
 
 EagerProduct::EagerProduct(const GaussiansView& reflectance, const GaussiansView& light, int lanes)
-    : lanes_(lanes),
-      mass_(HWY_DYNAMIC_DISPATCH(formKernel)(reflectance, light, lanes, pairs_.data())),
-      count_(reflectance.count * light.stride) {}
+    : lanes_(lanes), count_(reflectance.count * light.stride) {
+  mass_ = HWY_DYNAMIC_DISPATCH(formKernel)(reflectance, light, lanes, pairs_.data());
+}
 
 Vec2 EagerProduct::sample(float choice, const Vec2& u) const {
   const GaussiansView view{pairs_.data(), kMostPairs, count_};
