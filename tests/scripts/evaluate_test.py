@@ -137,23 +137,25 @@ def check_charts(folder):
     assert "product-naive" in (folder / "errors.svg").read_text()
     room = folder / "room"
     room.mkdir()
-    rows = [f"{10 + n},{n},{0.3 / n},{0.4 / n},1000" for n in range(1, 65)]
-    (room / "product.csv").write_text("\n".join(["seconds,spp,trimmed,all,resident_bytes", *rows]))
+    rows = [f"{10 + n},{n},{0.4 / n},{0.3 / n ** 0.9},1000" for n in range(1, 65)]
+    (room / "product.csv").write_text("\n".join(["seconds,spp,error,trimmed,resident_bytes", *rows]))
     run("draw-long-run", room, "-o", folder / "long.svg")
-    assert "product: -1.00 (-" in (folder / "long.svg").read_text(), "the slope is not shown"
+    assert "product, 74 s: -1.00 (-0.90)" in (folder / "long.svg").read_text(), "the slope is not shown"
     assert "has no tables" in run("draw-long-run", folder, "-o", folder / "none.svg", code=1)
 
 
 def check_long_run(folder):
     out = folder / "long"
     shown = run("bench-long-run", out, ROOT / "scenes/livingroom.xml", "2", "--method", "bdpt-gradients", "--tools", folder / "tools")
-    assert "bdpt-gradients, slope 0.000" in shown, shown
+    assert "bdpt-gradients: slope 0.000, of the trimmed variance 0.000" in shown, shown
     assert (out / "bdpt-gradients-1.exr").read_text().count("--integrator bdpt --gradients l2"), "not the options of the method"
     with open(out / "bdpt-gradients.csv", newline="") as file:
-        samples = [row["spp"] for row in csv.DictReader(file)]
-    assert len(samples) >= 2 and samples[-1] == "3.0", samples
+        rows = list(csv.DictReader(file))
+    assert len(rows) >= 2 and rows[-1]["spp"] == "3.0", rows
+    # Half of the relMSE of both last pictures.
+    assert {float(row["error"]) for row in rows} == {0.01}, rows
     run("draw-long-run", out, "-o", folder / "long.svg")
-    assert "bdpt-gradients: 0.00 (0.00)" in (folder / "long.svg").read_text()
+    assert ": 0.00 (0.00)" in (folder / "long.svg").read_text()
 
 
 def main():
