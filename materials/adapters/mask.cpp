@@ -74,8 +74,12 @@ class Mask final : public Bsdf {
 
   bool transmits() const override { return true; }
 
+  /// Light passes whatever the mapped normal is: where the viewer is behind it, a point that lets light pass has the
+  /// unmapped normal.
   Vec3 perturbedNormal(const Vec3& wo, const Vec2& uv, const Vec3& dpdu, const Vec3& dpdv) const override {
-    return nested_->perturbedNormal(wo, uv, dpdu, dpdv);
+    const Vec3 normal = nested_->perturbedNormal(wo, uv, dpdu, dpdv);
+    const bool behind = wo.z() * wo.dot(normal) <= 0.0f;
+    return behind && (opacity(uv) < 1.0f).any() ? Vec3(Vec3::UnitZ()) : normal;
   }
   bool mapsNormals() const override { return nested_->mapsNormals(); }
   bool shadowsTerminator() const override { return nested_->shadowsTerminator(); }

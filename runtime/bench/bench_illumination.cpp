@@ -19,6 +19,7 @@
 #include "runtime/core/statistics.h"
 #include "runtime/guiding/field_data.h"
 #include "runtime/guiding/sample_storage_data.h"
+#include "runtime/render/training/visible_region.h"
 #include "runtime/tools/json_text.h"
 
 namespace {
@@ -150,8 +151,9 @@ void run(Options& o) {
   o.plan.passes = o.passes.front();
   o.plan.validate();
   const Scene scene = o.readScene();
-  const RenderScene renderScene(scene);
+  RenderScene renderScene(scene);
   const RayCamera camera(scene.camera, scene.filter);
+  renderScene.lights.focus(visibleRegion(renderScene, camera, o.plan.seed, o.plan.maxDepth));
   Progress progress("training", static_cast<double>(o.sources.size() * o.passes.size() + 1));
   std::vector<Trained> trainings;
   for (const TrainFrom from : o.sources) {

@@ -21,6 +21,7 @@
 #include "runtime/core/sampling.h"
 #include "runtime/core/statistics.h"
 #include "runtime/guiding/field_data.h"
+#include "runtime/render/training/visible_region.h"
 #include "runtime/tools/json_text.h"
 
 namespace {
@@ -330,8 +331,9 @@ void run(Options& o) {
   if (o.threads > 0) limit.emplace(oneapi::tbb::global_control::max_allowed_parallelism, o.threads);
   o.plan.validate();
   const Scene scene = o.readScene();
-  const RenderScene renderScene(scene);
+  RenderScene renderScene(scene);
   const RayCamera camera(scene.camera, scene.filter);
+  renderScene.lights.focus(visibleRegion(renderScene, camera, o.plan.seed, o.plan.maxDepth));
   const LobeCacheSet caches(o.cacheFolder, lobeRequests(scene),
                             fmt::format("lobefit {} -o {}", o.scene, o.cacheFolder));
   const TrainedIllumination trained = trainIllumination(renderScene, camera, &caches, o.plan);

@@ -14,6 +14,7 @@
 #include <nlohmann/json.hpp>
 
 #include "fitter/compile.h"
+#include "runtime/core/files.h"
 #include "runtime/core/parallel.h"
 #include "runtime/core/stop.h"
 #include "runtime/tools/cache_report.h"
@@ -129,6 +130,9 @@ bool attempt(const CompileJob& job, Progress& progress, CacheReport& report, std
   try {
     report = compileOne(job, progress);
     return true;
+  } catch (const OutOfMemory& error) {
+    fault = error.what();
+    return false;
   } catch (const std::bad_alloc&) {
     fault = job.path.string() + ": not enough memory";
     return false;

@@ -176,8 +176,9 @@ void Run::prepare() {
   load_.embree = renderScene_->tracer.buildSeconds();
   camera_.emplace(scene_->camera, scene_->filter);
   const Stopwatch learning;
-  renderScene_->lights.focus(visibleRegion(*renderScene_, *camera_, job_.seed));
-  renderScene_->lights.use(learnLightCells(*renderScene_, *camera_, job_.seed));
+  const int maxDepth = planOf(job_, *scene_).maxDepth;
+  renderScene_->lights.focus(visibleRegion(*renderScene_, *camera_, job_.seed, maxDepth));
+  renderScene_->lights.use(learnLightCells(*renderScene_, *camera_, job_.seed, maxDepth));
   guiding_.secondsLights = learning.seconds();
   if (job_.gradients)
     gradients_.emplace(camera_->width(), camera_->height());
@@ -227,8 +228,8 @@ void Run::readIllumination(const IlluminationFile& file, const std::filesystem::
                                  path.string(), kInitialBsdfFraction));
   if (guiding_.training.maxDepth < planOf(job_, *scene_).maxDepth)
     printNote(kTool,
-              fmt::format("{}: trained for paths of up to {} segments; the light that only longer ones find is not "
-                          "guided",
+              fmt::format("{}: trained for paths of up to {} segments; its records do not guide the light that only "
+                          "longer ones find",
                           path.string(), guiding_.training.maxDepth));
   load_.restoring = restoring.seconds();
 }

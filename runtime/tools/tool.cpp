@@ -226,6 +226,8 @@ void checkNotRead(const std::filesystem::path& output, const std::vector<std::fi
 void OutputErrors::attempt(const std::filesystem::path& path, const std::function<void()>& write) {
   try {
     write();
+  } catch (const OutOfMemory& e) {
+    errors_.emplace_back(e.what());
   } catch (const std::bad_alloc&) {
     errors_.push_back(path.string() + ": not enough memory");
   } catch (const std::exception& e) {

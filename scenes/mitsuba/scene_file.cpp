@@ -228,9 +228,10 @@ std::size_t SceneFile::addIncluded(pugi::xml_node include, std::size_t around) {
       fail(at, fmt::format("<include>: {} includes itself", path.string()));
     if (file == 0) break;
   }
-  included_ += std::filesystem::file_size(path);
-  if (files_[0].text.size() + included_ > kLongestText)
+  const std::uintmax_t size = std::filesystem::file_size(path);
+  if (files_[0].text.size() + included_ + size > kLongestText)
     fail(at, fmt::format("the file with all included files is longer than {} bytes", kLongestText));
+  included_ += size;
   return addFile(path, around);
 }
 

@@ -571,6 +571,17 @@ TEST_CASE("light paths: guided emission of the environment gives the image of pa
   CHECK(agree(path, renderBlocks(stage, guided, {48, 24, 2000})));
 }
 
+TEST_CASE("bidirectional: lights chosen by their power in a part of the scene give the image of path tracing") {
+  const std::string light = GENERATE(std::string(), std::string(R"(<emitter type="directional"><vector name="direction"
+    x="-0.3" y="0.4" z="-2"/><rgb name="irradiance" value="3, 2, 2.5"/></emitter>)"));
+  Scene scene = sceneWith(std::string(kFloor) + kLamp + light);
+  if (light.empty()) scene.environment = brightSpot();
+  Stage stage(std::move(scene));
+  stage.ready.lights.focus({Vec3(-0.6f, -1.4f, -0.1f), Vec3(1.9f, 1, 1.9f)});
+  REQUIRE(stage.ready.lights.region().diagonal() < 0.9f * stage.ready.tracer.bounds().diagonal().norm());
+  CHECK(agreesWithPath(stage));
+}
+
 TEST_CASE("bidirectional: a choice of lights that depends on the place gives the image of path tracing") {
   // Each part of the room has a lamp of its own, so that the learnt probabilities differ between neighbours.
   std::string lamps;

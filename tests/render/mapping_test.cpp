@@ -31,6 +31,13 @@ BsdfPtr mapOf(double degrees, bool flips, bool shadows) {
   return makeBsdf("normalmap", map);
 }
 
+BsdfPtr masked(double opacity, BsdfPtr nested) {
+  Parameters mask;
+  mask.set("opacity", opacity);
+  mask.addChild(std::move(nested));
+  return makeBsdf("mask", mask);
+}
+
 /// The radiance of a white diffuse surface with a normal tilted by the angle under a sky of radiance 1: ∫ cosθ/π times
 /// shadowing over directions above both the floor and the mapped surface. Without shadowing it is (1 + cos) / 2.
 double reflected(double degrees, bool shadows) {
@@ -72,6 +79,28 @@ TEST_CASE("render: the radiance of a normal-mapped surface agrees with numerical
 TEST_CASE("render: a mapped normal that faces away is black or flipped") {
   CHECK(seenFrom(Floor(mapOf(50.0, false, false)), kAverted).mean() == 0.0);
   CHECK(deviation(seenFrom(Floor(mapOf(50.0, true, true)), kAverted), reflected(50.0, true)) < kMaxDeviation);
+}
+
+TEST_CASE("render: a transparent mask shows what is behind it, whatever the normals of its nested map") {
+  for (const double degrees : {20.0, 50.0, 75.0})
+    for (const bool flips : {false, true})
+      for (const bool shadows : {false, true})
+        for (const Vec3& towards : {kFacing, kAverted})
+          CHECK(deviation(seenFrom(Floor(masked(0.0, mapOf(degrees, flips, shadows))), towards), 1.0) < kMaxDeviation);
+  // Half of the light passes, also from where the map would be black.
+  CHECK(seenFrom(Floor(masked(0.5, mapOf(50.0, false, false))), kAverted).mean() > 0.4);
+  // Opaque points keep the mapped normal.
+  CHECK(seenFrom(Floor(masked(1.0, mapOf(50.0, false, false))), kAverted).mean() == 0.0);
+}
+
+TEST_CASE("render: invisible surfaces let light pass, whatever their vertex normals are") {
+  for (const BsdfPtr& bsdf : {makeBsdf("null", {}), masked(0.0, makeBsdf("diffuse", {}))}) {
+    Floor floor(bsdf);
+    auto& mesh = std::get<TriangleMesh>(floor.scene.shapes[0].geometry);
+    mesh.normals.assign(mesh.positions.size(), Vec3(std::sin(0.9f), 0, std::cos(0.9f)));
+    CHECK(seenFrom(floor, kAverted).mean() == Approx(1.0));
+    CHECK(seenFrom(floor, kFacing).mean() == Approx(1.0));
+  }
 }
 
 TEST_CASE("render: shadowing at the terminator scales BSDF values and samples alike") {

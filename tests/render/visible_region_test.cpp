@@ -1,5 +1,7 @@
 // The part of a scene that a camera sees: large surroundings must not change what is learnt about a room.
 
+#include <cmath>
+
 #include <oneapi/tbb/global_control.h>
 
 #include "runtime/guiding/field_data.h"
@@ -129,4 +131,23 @@ TEST_CASE("visible region: photons that start on its disc pass through it, from 
     }
   }
   CHECK_FALSE(region.coordinates(Vec3(100, 0, 0), Vec3::UnitY()));
+}
+
+TEST_CASE("visible region: a scene without shapes keeps finite powers of its lights") {
+  Scene scene;
+  scene.environment = environment(Image(16, 8, grey(1)));
+  scene.camera.width = scene.camera.height = 8;
+  RenderScene ready(scene);
+  ready.lights.focus(visibleRegion(ready, cameraOf(scene), 1));
+  CHECK(std::isfinite(ready.lights.region().diagonal()));
+  CHECK(ready.lights.environmentProbability() == 1);
+}
+
+TEST_CASE("visible region: a picture of direct light has the vertices that the camera sees") {
+  const Scene scene = onGround(4000);
+  const RenderScene ready(scene);
+  const Eigen::AlignedBox3f all = visibleRegion(ready, cameraOf(scene), 1);
+  const Eigen::AlignedBox3f direct = visibleRegion(ready, cameraOf(scene), 1, 2);
+  CHECK(all.contains(direct));
+  CHECK(direct.diagonal().norm() < 0.99f * all.diagonal().norm());
 }

@@ -146,12 +146,22 @@ Vec3 facing(const Vec3& normal, const Vec3& side) {
 
 /// Sets the shading frame and the values that follow from bump mapping; hit.bsdf and hit.woWorld must be set. unit: the
 /// unit of lengths in BSDFs, such as the height of bumps, in scene units.
+/// Whether the point leaves all light as it is: null, or a mask where it is transparent.
+bool isInvisible(const Bsdf& bsdf, const Vec2& uv) {
+  if (!bsdf.transmits()) return false;
+  const std::optional<DeltaTransmission> through = bsdf.deltaTransmission(Vec3::UnitZ(), uv);
+  return through && through->straight && (through->weight >= 1.0f).all();
+}
+
+/// Invisible points have the geometric frame, which lets light pass from every direction.
 void setFrame(const Resolved& r, float unit, SurfaceHit& hit) {
-  const Frame frame = Frame::fromTangent(facing(r.shadingNormal, r.point.normal), r.derivatives.dpdu);
+  const bool invisible = hit.bsdf && isInvisible(*hit.bsdf, r.point.uv);
+  const Vec3 normal = invisible ? r.point.normal : facing(r.shadingNormal, r.point.normal);
+  const Frame frame = Frame::fromTangent(normal, r.derivatives.dpdu);
   hit.frame = frame;
   hit.unmapped = Vec3::UnitZ();
   hit.terminatorRoughness2 = 0.0f;
-  if (!hit.bsdf) return;
+  if (!hit.bsdf || invisible) return;
   const Vec3 local =
       hit.bsdf->perturbedNormal(frame.toLocal(hit.woWorld), r.point.uv, frame.toLocal(r.derivatives.dpdu / unit),
                                 frame.toLocal(r.derivatives.dpdv / unit));
@@ -161,9 +171,10 @@ void setFrame(const Resolved& r, float unit, SurfaceHit& hit) {
   if (hit.bsdf->shadowsTerminator()) hit.terminatorRoughness2 = terminatorRoughness2(hit.unmapped.z());
 }
 
-/// Smith's shadowing term of GGX microfacets on the surface without bump mapping.
+/// Smith's shadowing term of GGX microfacets on the surface without bump mapping. Light that passes straight through,
+/// as through a mask, is not shadowed.
 float terminatorShadowing(const SurfaceHit& hit, const Vec3& wi) {
-  if (hit.terminatorRoughness2 <= 0.0f) return 1.0f;
+  if (hit.terminatorRoughness2 <= 0.0f || wi == -hit.wo) return 1.0f;
   const float cosine = hit.unmapped.dot(wi);
   const float cosine2 = std::min(1.0f, cosine * cosine);
   return 2.0f / (1.0f + std::sqrt(1.0f + hit.terminatorRoughness2 * (1.0f - cosine2) / cosine2));
@@ -282,7 +293,8 @@ std::optional<DeltaSample> sampleAdjointDelta(const SurfaceHit& hit, float choic
   if (!sample) return std::nullopt;
   const float in = std::abs(hit.wo.z() / hit.normal.dot(hit.woWorld));
   const float out = std::abs(hit.normal.dot(hit.frame.toWorld(sample->wi)) / sample->wi.z());
-  sample->weight *= sample->eta * sample->eta * in * out * terminatorShadowing(hit, hit.wo);
+  sample->weight *= sample->eta * sample->eta * in * out;
+  if (sample->wi != -hit.wo) sample->weight *= terminatorShadowing(hit, hit.wo);
   return sample;
 }
 

@@ -112,7 +112,7 @@ Lights::Lights(const Scene& scene, const Eigen::AlignedBox3f& bounds)
 }
 
 void Lights::focus(const Eigen::AlignedBox3f& region) {
-  region_ = {region.center(), 0.5f * region.diagonal().norm()};
+  if (!region.isEmpty()) region_ = {region.center(), 0.5f * region.diagonal().norm()};
   makeChoices();
 }
 

@@ -47,7 +47,7 @@ struct EmittedPhoton {
   float cosine() const { return normal.isZero() ? 1.0f : std::abs(normal.dot(ray.direction)); }
 };
 
-/// Bounding sphere of the scene.
+/// Bounding sphere of the scene or of a part of it.
 struct SceneSphere {
   Vec3 centre = Vec3::Zero();
   float radius = 1;
@@ -131,7 +131,8 @@ class Lights {
   float importance(int cluster, const LightReceiver& at) const;
   /// Restricts the part of the scene that counts: the environment and directional lights have the power that enters
   /// this region, so that they do not take all samples from lamps in a room on a large ground plane. The default is the
-  /// bounding box of the scene. Restores the prior probabilities of the clusters.
+  /// bounding box of the scene, also if the region is empty. The clusters are made anew: learnt probabilities are
+  /// discarded, and no LightSelection, LightCells or EnvironmentGuide from before may be used any more.
   void focus(const Eigen::AlignedBox3f& region);
   /// The bounding sphere of that region.
   const SceneSphere& region() const { return region_; }
@@ -141,10 +142,12 @@ class Lights {
 
   Rgb environmentRadiance(const Vec3& direction) const;
 
-  /// Samples a photon in proportion to power: surfaces by area and cosine, point and spot lights uniformly over the
-  /// solid angle that they light, the environment by radiance. Photons from the environment and from directional lights
-  /// start uniformly on the disc to which the bounding sphere of the scene projects in that direction. Must not be
-  /// called if empty(). nullopt: a photon of zero power.
+  /// Samples a photon. The light is chosen by its power, that of the environment and of directional lights by the power
+  /// that enters the region. Surfaces are sampled by area and cosine, point and spot lights uniformly over the solid
+  /// angle that they light, the environment by radiance. Photons from the environment and from directional lights start
+  /// uniformly on the disc to which the bounding sphere of the whole scene projects in that direction, so that they
+  /// have more power than others if the region is smaller. Must not be called if empty(). nullopt: a photon of zero
+  /// power.
   std::optional<EmittedPhoton> samplePhoton(double choice, const Vec2& u1, const Vec2& u2) const;
 
   /// EmittedPhoton::density of the photon that travels along the ray of a hit on a light in the opposite direction; 0

@@ -70,14 +70,15 @@ class LightObserver {
 };
 
 std::vector<LightObservation> observations(const RenderScene& scene, const RayCamera& camera,
-                                           const Exploration& exploration, std::uint64_t seed, int round, int paths) {
+                                           const Exploration& exploration, std::uint64_t seed, int maxDepth, int round,
+                                           int paths) {
   const int chunks = (paths + kChunk - 1) / kChunk;
   std::vector<std::vector<LightObservation>> parts(chunks);
   parallelFor(0, chunks, [&](int chunk) {
     for (int i = chunk * kChunk; i < std::min(paths, (chunk + 1) * kChunk); ++i) {
       Sampler rng(seed ^ kLearningSeed, round, i);
       LightObserver observer(scene, exploration, rng, parts[chunk]);
-      walkFromCamera(scene, camera, rng, [&](const SurfaceHit& hit, float delta) {
+      walkFromCamera(scene, camera, maxDepth, rng, [&](const SurfaceHit& hit, float delta) {
         if (delta >= 1) return;
         for (int k = 0; k < kSamplesPerVertex; ++k) observer.observe(hit, 1 - delta);
       });
@@ -90,7 +91,7 @@ std::vector<LightObservation> observations(const RenderScene& scene, const RayCa
 
 }  // namespace
 
-LightCells learnLightCells(const RenderScene& scene, const RayCamera& camera, std::uint64_t seed) {
+LightCells learnLightCells(const RenderScene& scene, const RayCamera& camera, std::uint64_t seed, int maxDepth) {
   const Lights& lights = scene.lights;
   if (lights.clusters() < 2) return {};
   std::vector<float> prior, exploring;
@@ -104,9 +105,9 @@ LightCells learnLightCells(const RenderScene& scene, const RayCamera& camera, st
   const auto paths = static_cast<int>(std::clamp(pixels / kPixelsPerPath, kLeastPaths, kMostPaths));
   // The second half of the observations is made where the first half has found light.
   Exploration exploration{cumulative(std::vector<double>(exploring.begin(), exploring.end())), {}};
-  std::vector<LightObservation> all = observations(scene, camera, exploration, seed, 0, paths / 2);
+  std::vector<LightObservation> all = observations(scene, camera, exploration, seed, maxDepth, 0, paths / 2);
   exploration.cells = LightCells(all, exploring, importance, length);
-  const std::vector<LightObservation> more = observations(scene, camera, exploration, seed, 1, paths / 2);
+  const std::vector<LightObservation> more = observations(scene, camera, exploration, seed, maxDepth, 1, paths / 2);
   all.insert(all.end(), more.begin(), more.end());
   return {std::move(all), prior, importance, length};
 }

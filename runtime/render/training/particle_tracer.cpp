@@ -1,6 +1,7 @@
 #include "runtime/render/training/particle_tracer.h"
 
 #include "runtime/core/parallel.h"
+#include "runtime/render/training/camera_walk.h"
 
 namespace lobe {
 namespace {
@@ -52,10 +53,7 @@ ParticleTracer::ParticleTracer(const RenderScene& scene, const RayCamera& camera
 ImportonResult ParticleTracer::traceImportons(int pass, int count, const ImportonWishes& wishes) const {
   auto results = traceChunks<ImportonResult>(
       seed_, 2 * static_cast<std::uint64_t>(pass), count, [&](int i, Sampler& rng, ImportonResult& result) {
-        const Vec2 pixel = rng.uniform2();
-        const int x = static_cast<int>(pixel.x() * static_cast<float>(camera_.width()));
-        const int y = static_cast<int>(pixel.y() * static_cast<float>(camera_.height()));
-        const Ray ray = camera_.sample(x, y, rng);
+        const Ray ray = sampleCameraRay(camera_, rng);
         ImportonWalk(scene_, radiance_, wishes, rng, result, maxDepth_).run(ray, static_cast<std::uint64_t>(i));
       });
   ImportonResult all{merged(results, &ImportonResult::radiance), merged(results, &ImportonResult::importance), {}};

@@ -33,7 +33,7 @@ struct TrainingPlan {
   bool learnFractions = true;
   bool keepParticles = false;   ///< keep those of the last pass in TrainedIllumination::particles
   bool keepImportance = false;  ///< keep what guided the photons in TrainedIllumination::importance
-  FieldOptions records;         ///< except for the scene's diagonal, which training sets
+  FieldOptions records;         ///< except for sceneDiagonal, which training sets to that of Lights::region
 
   /// Throws std::runtime_error that names the field.
   void validate() const;

@@ -19,12 +19,13 @@ constexpr std::size_t kLeastVertices = 64;
 constexpr double kOutside = 0.025;
 constexpr float kEnlargement = 0.25f;  // at each side, relative to the extent
 
-std::vector<Vec3> verticesOf(const RenderScene& scene, const RayCamera& camera, std::uint64_t seed) {
+std::vector<Vec3> verticesOf(const RenderScene& scene, const RayCamera& camera, std::uint64_t seed, int maxDepth) {
   std::vector<std::vector<Vec3>> parts(kPaths / kChunk);
   parallelFor(0, kPaths / kChunk, [&](int chunk) {
     for (int i = chunk * kChunk; i < (chunk + 1) * kChunk; ++i) {
       Sampler rng(seed ^ kTag, 0, i);
-      walkFromCamera(scene, camera, rng, [&](const SurfaceHit& hit, float) { parts[chunk].push_back(hit.position); });
+      walkFromCamera(scene, camera, maxDepth, rng,
+                     [&](const SurfaceHit& hit, float) { parts[chunk].push_back(hit.position); });
     }
   });
   std::vector<Vec3> all;
@@ -41,9 +42,9 @@ float coordinateAt(std::vector<Vec3>& points, int axis, std::size_t rank) {
 
 }  // namespace
 
-Eigen::AlignedBox3f visibleRegion(const RenderScene& scene, const RayCamera& camera, std::uint64_t seed) {
+Eigen::AlignedBox3f visibleRegion(const RenderScene& scene, const RayCamera& camera, std::uint64_t seed, int maxDepth) {
   const Eigen::AlignedBox3f& bounds = scene.tracer.bounds();
-  std::vector<Vec3> vertices = verticesOf(scene, camera, seed);
+  std::vector<Vec3> vertices = verticesOf(scene, camera, seed, maxDepth);
   if (vertices.size() < kLeastVertices) return bounds;
   const auto outside = static_cast<std::size_t>(kOutside * static_cast<double>(vertices.size()));
   Vec3 low, high;

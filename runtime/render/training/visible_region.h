@@ -4,6 +4,7 @@
 // of a sky, says nothing about the room.
 
 #include <cstdint>
+#include <limits>
 
 #include "runtime/render/film/camera.h"
 #include "runtime/render/lights/render_scene.h"
@@ -11,7 +12,9 @@
 namespace lobe {
 
 /// A box around nearly all vertices, enlarged by half of their extent, but not beyond the bounding box of the scene;
-/// the latter if there are few vertices. Depends on the seed, not on the number of threads.
-Eigen::AlignedBox3f visibleRegion(const RenderScene& scene, const RayCamera& camera, std::uint64_t seed);
+/// the latter if there are few vertices. Depends on the seed, not on the number of threads. maxDepth:
+/// PathOptions::maxDepth of the picture.
+Eigen::AlignedBox3f visibleRegion(const RenderScene& scene, const RayCamera& camera, std::uint64_t seed,
+                                  int maxDepth = std::numeric_limits<int>::max());
 
 }  // namespace lobe
