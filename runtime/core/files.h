@@ -25,6 +25,7 @@ std::string readFile(const std::filesystem::path& path);
 /// not tolerate this: the file may be sound.
 class OutOfMemory : public std::bad_alloc {
  public:
+  // NOLINTNEXTLINE(bugprone-throw-keyword-missing): it initialises a member.
   explicit OutOfMemory(const std::filesystem::path& path) : message_(path.string() + ": not enough memory") {}
   const char* what() const noexcept override { return message_.what(); }
 

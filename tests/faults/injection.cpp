@@ -201,7 +201,7 @@ Totals totals;
 }  // namespace
 
 int inject(Countdown& countdown, const Subject& subject) {
-  REQUIRE(attempt(countdown, subject, 0) == "");
+  REQUIRE(attempt(countdown, subject, 0).empty());
   const long calls = countdown.calls;
   const Files files = filesIn(subject.out);
   const std::string result = subject.result();
@@ -218,7 +218,7 @@ int inject(Countdown& countdown, const Subject& subject) {
     survived += right ? 1 : 0;
     reported += error.empty() ? 0 : 1;
   }
-  CHECK(attempt(countdown, subject, 0) == "");
+  CHECK(attempt(countdown, subject, 0).empty());
   CHECK(isRight(true));
   totals.injected += injected;
   totals.survived += survived;

@@ -411,6 +411,6 @@ TEST_CASE("scenes: a vertex that is too far away is rejected") {
   const auto fault = [&](const std::string& x) {
     return faultOfReading([&] { readObj(folder.write("a.obj", "v 0 0 0\nv " + x + " 0 0\nv 0 1 0\nf 1 2 3\n"), {}); });
   };
-  CHECK(fault("9e14") == "");
+  CHECK(fault("9e14").empty());
   CHECK_THAT(fault("1e18"), Contains("a.obj: a vertex at 1e+18, 0, 0") && Contains("over 1e+15"));
 }
