@@ -129,8 +129,8 @@ namespace {
 namespace fs = std::filesystem;
 using Files = std::map<std::string, std::string>;  // contents by name
 
-/// The first calls, then fewer and fewer, and the last. The last allocations are those of destructors of the JSON
-/// library, which end the program if they fail.
+/// The first calls, then fewer and fewer, and the last; but not the last allocation, which a destructor of a library
+/// may make.
 std::vector<long> chosenUpTo(long last, const Countdown& countdown) {
   std::vector<long> chosen;
   for (long n = 1; n < last; n += 1 + n / 12) chosen.push_back(n);
