@@ -24,6 +24,8 @@
 #include "runtime/core/colour.h"
 #include "runtime/core/files.h"
 #include "runtime/core/fingerprint.h"
+#include "runtime/image/exr_file.h"
+#include "runtime/image/image_limits.h"
 #include "runtime/image/jpeg_file.h"
 #include "runtime/image/png_file.h"
 #include "runtime/image/rgbe_file.h"
@@ -47,30 +49,8 @@
 namespace lobe {
 namespace {
 
-/// Largest image that is read, so that a damaged header does not exhaust the memory.
-constexpr std::int64_t kMaxPixels = std::int64_t{1} << 27;
-
 [[noreturn]] void fail(const std::filesystem::path& path, const std::string& fault) {
   throw std::runtime_error(fmt::format("{}: {}", path.string(), fault));
-}
-
-void checkSize(const std::filesystem::path& path, std::int64_t width, std::int64_t height) {
-  if (width <= 0 || height <= 0 || width > kMaxPixels / height)
-    fail(path, fmt::format("its size of {}x{} pixels is outside the supported range", width, height));
-}
-
-// The most pixels that a byte can stand for. In EXR files, DWA compression keeps 2 bytes for 64 pixels of a channel,
-// and zlib then shortens them by a factor of up to 1032.
-constexpr std::uintmax_t kMostPerByte = 2000, kMostPerExrByte = 40000;
-
-/// Refuses small files that claim large images: even uniform images compress to no more than mostPerByte pixels per
-/// byte.
-void checkExpansion(const std::filesystem::path& path, std::int64_t width, std::int64_t height, std::uintmax_t bytes,
-                    std::uintmax_t mostPerByte) {
-  constexpr std::int64_t kLarge = std::int64_t{1} << 24;
-  checkSize(path, width, height);
-  if (width * height > kLarge && static_cast<std::uintmax_t>(width * height) / mostPerByte > bytes)
-    fail(path, fmt::format("a file of {2} bytes cannot contain {0}x{1} pixels", width, height, bytes));
 }
 
 float decode(float encoded, const Encoding& encoding) {
@@ -155,27 +135,18 @@ Image readDataWindow(const std::filesystem::path& path, Imf::InputFile& file, co
 /// namesOf: given the list of channels, which to read; nullopt: none, and there is no image.
 template <class NamesOf>
 std::optional<Image> readExrPixels(const std::filesystem::path& path, const NamesOf& namesOf) {
-  Imf::InputFile file(path.c_str());
+  const std::unique_ptr<Imf::InputFile> opened = openExr(path);
+  Imf::InputFile& file = *opened;
   const std::optional<ChannelNames> names = namesOf(file.header().channels());
   if (!names) return std::nullopt;
   const Area data(file.header().dataWindow()), display(file.header().displayWindow());
-  checkExpansion(path, data.width, data.height, std::filesystem::file_size(path), kMostPerExrByte);
-  checkExpansion(path, display.width, display.height, std::filesystem::file_size(path), kMostPerExrByte);
   Image image = readDataWindow(path, file, data, *names);
   return data == display ? image : placeOnDisplay(image, data, display);
 }
 
 template <class NamesOf>
 std::optional<Image> readExr(const std::filesystem::path& path, const NamesOf& namesOf) {
-  try {
-    return readExrPixels(path, namesOf);
-  } catch (const std::bad_alloc&) {
-    throw OutOfMemory(path);
-  } catch (const Iex::BaseExc& e) {
-    // OpenEXR keeps only the text of exceptions in its tasks.
-    if (std::string_view(e.what()).find("bad_alloc") != std::string_view::npos) throw OutOfMemory(path);
-    fail(path, fmt::format("damaged EXR file ({})", e.what()));
-  }
+  return nameExrErrors(path, [&] { return readExrPixels(path, namesOf); });
 }
 
 // ---- Other formats
@@ -255,7 +226,7 @@ Image loadPixels(const std::filesystem::path& path, std::string_view bytes, cons
 Image readHdr(const std::filesystem::path& path, std::string_view bytes, Part part) {
   if (part == Part::alpha) failWithoutAlpha(path);
   const auto [width, height] = nameErrors(path, [&] { return sizeOfRgbe(bytes); });
-  checkExpansion(path, width, height, bytes.size(), kMostPerByte);
+  checkImageSize(path, width, height, bytes.size());
   return nameErrors(path, [&] { return readRgbe(bytes); });
 }
 
@@ -268,7 +239,7 @@ Encoding resolved(const Encoding& encoding, std::string_view bytes) {
 
 Image readPngImage(const std::filesystem::path& path, std::string_view bytes, const Encoding& encoding, Part part) {
   const PngHeader header = nameErrors(path, [&] { return headerOfPng(bytes); });
-  checkExpansion(path, header.width, header.height, bytes.size(), kMostPerByte);
+  checkImageSize(path, header.width, header.height, bytes.size());
   if (part == Part::alpha && !header.hasAlpha) failWithoutAlpha(path);
   const PngCodes pixels = nameErrors(path, [&] { return readPng(bytes); });
   const auto decodeCodes = [&](const auto& codes) {
@@ -280,7 +251,7 @@ Image readPngImage(const std::filesystem::path& path, std::string_view bytes, co
 Image readJpegImage(const std::filesystem::path& path, std::string_view bytes, const Encoding& encoding, Part part) {
   if (part == Part::alpha) failWithoutAlpha(path);
   const JpegSize size = nameErrors(path, [&] { return sizeOfJpeg(bytes); });
-  checkExpansion(path, size.width, size.height, bytes.size(), kMostPerByte);
+  checkImageSize(path, size.width, size.height, bytes.size());
   const JpegPixels pixels = nameErrors(path, [&] { return readJpeg(bytes); });
   return decodeColours(pixels.codes.data(), pixels.width, pixels.height, encoding);
 }
@@ -298,7 +269,7 @@ Image readOther(const std::filesystem::path& path, const Encoding& encoding, Par
   if (!stbi_info_from_memory(data, length, &width, &height, &channels))
     fail(path, fmt::format("unsupported image format ({}); supported are PNG, JPEG, BMP, TGA, HDR and EXR",
                            stbi_failure_reason()));
-  checkExpansion(path, width, height, bytes.size(), kMostPerByte);
+  checkImageSize(path, width, height, bytes.size());
   if (part == Part::alpha && channels != 2 && channels != 4) failWithoutAlpha(path);
   return loadPixels(path, bytes, encoding, part);
 }

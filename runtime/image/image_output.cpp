@@ -22,6 +22,7 @@
 #include "runtime/core/atomic_file.h"
 #include "runtime/core/colour.h"
 #include "runtime/core/files.h"
+#include "runtime/image/exr_file.h"
 
 #ifndef __clang_analyzer__  // which reports code of the library
 #define STB_IMAGE_WRITE_IMPLEMENTATION
@@ -193,15 +194,13 @@ std::size_t writeImage(const std::filesystem::path& path, const Image& image, co
 ImageAttributes readAttributes(const std::filesystem::path& path) {
   ImageAttributes attributes;
   if (!isExrFile(path)) return attributes;
-  nameErrors(path, [&] {
-    const Imf::InputFile file(path.c_str());
-    for (auto entry = file.header().begin(); entry != file.header().end(); ++entry) {
-      if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&entry.attribute()))
-        attributes[entry.name()] = text->value();
-      else if (const auto* number = dynamic_cast<const Imf::DoubleAttribute*>(&entry.attribute()))
-        attributes[entry.name()] = number->value();
-    }
-  });
+  const std::unique_ptr<const Imf::InputFile> file = openExr(path);
+  for (auto entry = file->header().begin(); entry != file->header().end(); ++entry) {
+    if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&entry.attribute()))
+      attributes[entry.name()] = text->value();
+    else if (const auto* number = dynamic_cast<const Imf::DoubleAttribute*>(&entry.attribute()))
+      attributes[entry.name()] = number->value();
+  }
   return attributes;
 }
 

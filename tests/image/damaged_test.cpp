@@ -67,6 +67,21 @@ TEST_CASE("render: a small PNG that claims a large size is rejected") {
   CHECK_THROWS_WITH(readBytes("a.png", pngThatClaims(0xffffffff, 0xffffffff)), Contains("a.png: "));
 }
 
+TEST_CASE("render: an EXR whose attribute claims more bytes than the file has is rejected") {
+  const test::Folder folder;
+  writeImage(folder / "a.exr", Image(3, 2), {{"seed", 1.0}});
+  std::string bytes = test::readFile(folder / "a.exr");
+  CHECK(readBytes("a.exr", bytes).width == 3);
+  const std::string attribute{"seed\0double\0", 12};
+  const std::size_t size = bytes.find(attribute) + attribute.size();
+  REQUIRE(bytes[size] == sizeof(double));
+  bytes[size + 3] = 0x65;  // the highest byte of four
+  std::ofstream(folder / "a.exr", std::ios::binary) << bytes;
+  const std::string fault = "a.exr: damaged EXR file (Attribute 'seed': Invalid size 1694498824";
+  CHECK_THROWS_WITH(readImage(folder / "a.exr"), Contains(fault));
+  CHECK_THROWS_WITH(readAttributes(folder / "a.exr"), Contains(fault));
+}
+
 TEST_CASE("render: a JPEG with damaged Huffman tables is rejected or read, but never crashes") {
   const std::string bytes = jpegOfNoise(17, 13);
   CHECK(readBytes("a.jpg", bytes).height == 13);
