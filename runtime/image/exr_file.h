@@ -25,7 +25,7 @@ auto nameExrErrors(const std::filesystem::path& path, Read&& read) {
     throw OutOfMemory(path);
   } catch (const Iex::BaseExc& e) {
     // OpenEXR keeps only the text of exceptions in its tasks.
-    if (std::string_view(e.what()).find("bad_alloc") != std::string_view::npos) throw OutOfMemory(path);
+    if (std::string_view(e.what()).ends_with("std::bad_alloc")) throw OutOfMemory(path);
     throw std::runtime_error(fmt::format("{}: damaged EXR file ({})", path.string(), e.what()));
   }
 }

@@ -98,11 +98,11 @@ inline std::vector<TestField> measuredFields(const Brdf& brdf, const std::vector
 /// The bytes of a MERL file with the values of the BRDF at the centres of its bins.
 inline std::string merlFile(const Brdf& brdf) {
   constexpr double kPiD = std::numbers::pi;
-  constexpr std::size_t kBins = 90 * 90 * 180;
+  constexpr std::size_t kBinsPerHalf = std::size_t{90} * 180, kBins = 90 * kBinsPerHalf;
   const double scales[] = {1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0};
   std::vector<double> planes(3 * kBins);
   for (std::size_t bin = 0; bin < kBins; ++bin) {
-    const double root = (static_cast<double>(bin / 16200) + 0.5) / 90.0;
+    const double root = (static_cast<double>(bin / kBinsPerHalf) + 0.5) / 90.0;
     const double half = 0.5 * kPiD * root * root;
     const Eigen::Vector3d d = fromAngles((static_cast<double>(bin / 180 % 90) + 0.5) * kPiD / 180.0,
                                          (static_cast<double>(bin % 180) + 0.5) * kPiD / 180.0);

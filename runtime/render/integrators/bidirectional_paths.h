@@ -18,6 +18,7 @@
 // Connections do not pass through surfaces that transmit light: what is behind glass is found by tracing rays. A point
 // or directional light behind glass is therefore not seen in a mirror.
 
+#include <cmath>
 #include <deque>
 
 #include "runtime/render/film/light_image.h"
@@ -524,8 +525,9 @@ Rgb radianceWithLightPaths(const RenderScene& scene, const RayCamera& camera, co
                            const Ray& ray, Sampler& rng, Sampler& lightRng, PathStatistics& statistics,
                            std::vector<Splat>* splats) {
   BidirectionalPaths paths(scene, camera, options, cameraGuide, lightGuide);
-  for (double left = splats ? tracing.pathsPerPixel - lightRng.uniformDouble() : 0; left > 0; left -= 1)
-    paths.traceLight(tracing, lightRng, statistics, *splats);
+  // Rounded up or down at random; the number is at least 0, because uniformDouble() is below 1.
+  const int lightPaths = splats ? static_cast<int>(std::ceil(tracing.pathsPerPixel - lightRng.uniformDouble())) : 0;
+  for (int i = 0; i < lightPaths; ++i) paths.traceLight(tracing, lightRng, statistics, *splats);
   return PathLoop(scene, options, cameraGuide, LightPaths(scene, camera, lightGuide, tracing))
       .radiance(ray, rng, statistics);
 }

@@ -188,6 +188,7 @@ class GridRenderer {
     while (static_cast<int>(grids_.size()) < count)
       grids_.emplace_back(camera_.width(), camera_.height(), tiles_.border());
     std::vector<Vec2> offsets;
+    offsets.reserve(static_cast<std::size_t>(count));
     for (int i = 0; i < count; ++i) offsets.push_back(gridOffset(camera_, options_, first + i));
     return tiles_.render([&] { return isSet(options_.stop); },
                          [&](int x, int y, int, PathStatistics& statistics) {

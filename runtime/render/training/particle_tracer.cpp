@@ -31,6 +31,7 @@ std::vector<Result> traceChunks(std::uint64_t seed, std::uint64_t stream, int co
 template <class Result>
 SampleStorage merged(std::vector<Result>& results, SampleStorage Result::*storage) {
   std::vector<SampleStorage> parts;
+  parts.reserve(results.size());
   for (Result& result : results) parts.push_back(std::move(result.*storage));
   SampleStorage all;
   all.merge(parts);

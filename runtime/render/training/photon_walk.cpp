@@ -17,7 +17,7 @@ constexpr int kMaxBranchesOfPhoton = 512;
 // Segments of all photons of a result, 64 for each photon of a chunk of ParticleTracer, after which none of them is
 // split. In a closed room of reflectance 1.5, where every photon would be split, a pass of 300,000 photons then stores
 // 30 million particles (1.4 GB) instead of 280 million.
-constexpr std::uint64_t kMaxSegmentsWithSplitting = 64 * 256;
+constexpr std::uint64_t kMaxSegmentsWithSplitting = std::uint64_t{64} * 256;
 
 }  // namespace
 
