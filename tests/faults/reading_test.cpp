@@ -8,19 +8,12 @@
 #include <fmt/format.h>
 #include <catch2/catch.hpp>
 
-#define STB_IMAGE_WRITE_IMPLEMENTATION
-#define STB_IMAGE_WRITE_STATIC
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wunused-function"
-#include <stb/stb_image_write.h>
-#pragma GCC diagnostic pop
-
-#include "runtime/core/atomic_file.h"
 #include "runtime/image/image_output.h"
 #include "scenes/mitsuba/reader.h"
 #include "scenes/scene_hash.h"
 #include "tests/faults/injection.h"
 #include "tests/support/measured_files.h"
+#include "tests/support/picture_files.h"
 #include "tests/support/small_images.h"
 #include "tests/support/tool_run.h"
 
@@ -57,9 +50,9 @@ class Files : public Folder {
     for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = grey(static_cast<float>(i % 9) / 9);
     for (const char* name : {"a.png", "b.png", "a.exr"}) writeImage(*this / name, image);
     const std::vector<std::uint8_t> codes(3 * 16 * 16, 100);
-    REQUIRE(stbi_write_jpg((*this / "a.jpg").c_str(), 16, 16, 3, codes.data(), 90));
+    write("a.jpg", pictureFile("jpg", 16, 16, codes));
     const std::vector<float> values(3 * 8 * 4, 0.5f);
-    REQUIRE(stbi_write_hdr((*this / "a.hdr").c_str(), 8, 4, 3, values.data()));
+    write("a.hdr", hdrFile(8, 4, values));
     write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl red\nf 1/1 2/1 3/1\n");
     write("a.mtl", "newmtl red\nmap_Kd b.png\n");
     write("a.ply",
@@ -71,9 +64,6 @@ class Files : public Folder {
               bitmap("a.png") + bitmap("a.jpg") + bitmap("a.exr") + mesh("obj") + mesh("ply") + mesh("serialized") +
               "<emitter type=\"envmap\"><string name=\"filename\" value=\"a.hdr\"/></emitter></scene>");
   }
-
- private:
-  void write(const std::string& name, const std::string& bytes) const { writeAtomically(*this / name, bytes); }
 };
 
 int injectInto(Countdown& countdown, bool lenient) {

@@ -1,21 +1,13 @@
 // Image files with damaged or false headers.
 
 #include <cstdint>
-#include <fstream>
 #include <string>
-#include <vector>
 
 #include <zlib.h>
 #include <catch2/catch.hpp>
 
-#define STB_IMAGE_WRITE_IMPLEMENTATION
-#define STB_IMAGE_WRITE_STATIC
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wunused-function"
-#include <stb/stb_image_write.h>
-#pragma GCC diagnostic pop
-
 #include "runtime/image/image_output.h"
+#include "tests/support/picture_files.h"
 #include "tests/support/tool_run.h"
 
 using namespace lobe;
@@ -42,18 +34,9 @@ std::string pngThatClaims(std::uint32_t width, std::uint32_t height) {
   return bytes;
 }
 
-std::string jpegOfNoise(int width, int height) {
-  const test::Folder folder;
-  std::vector<std::uint8_t> noise(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 3);
-  for (std::size_t i = 0; i < noise.size(); ++i) noise[i] = static_cast<std::uint8_t>(i * i / 7);
-  REQUIRE(stbi_write_jpg((folder / "a.jpg").c_str(), width, height, 3, noise.data(), 90));
-  return test::readFile(folder / "a.jpg");
-}
-
 Image readBytes(const std::string& name, const std::string& bytes) {
   const test::Folder folder;
-  std::ofstream(folder / name, std::ios::binary) << bytes;
-  return readImage(folder / name);
+  return readImage(folder.write(name, bytes));
 }
 
 }  // namespace
@@ -76,14 +59,14 @@ TEST_CASE("render: an EXR whose attribute claims more bytes than the file has is
   const std::size_t size = bytes.find(attribute) + attribute.size();
   REQUIRE(bytes[size] == sizeof(double));
   bytes[size + 3] = 0x65;  // the highest byte of four
-  std::ofstream(folder / "a.exr", std::ios::binary) << bytes;
+  folder.write("a.exr", bytes);
   const std::string fault = "a.exr: damaged EXR file (Attribute 'seed': Invalid size 1694498824";
   CHECK_THROWS_WITH(readImage(folder / "a.exr"), Contains(fault));
   CHECK_THROWS_WITH(readAttributes(folder / "a.exr"), Contains(fault));
 }
 
 TEST_CASE("render: a JPEG with damaged Huffman tables is rejected or read, but never crashes") {
-  const std::string bytes = jpegOfNoise(17, 13);
+  const std::string bytes = test::pictureFile("jpg", 17, 13, test::noiseCodes(17, 13));
   CHECK(readBytes("a.jpg", bytes).height == 13);
   const std::size_t marker = bytes.find("\xff\xc4");
   REQUIRE(marker != std::string::npos);

@@ -1,7 +1,6 @@
 // Serialized meshes, written here in Mitsuba's format.
 
 #include <cstring>
-#include <fstream>
 #include <random>
 
 #include <sys/resource.h>
@@ -92,9 +91,7 @@ long peakMemory() {
 
 TriangleMesh read(const std::string& bytes, int index = 0, const MeshOptions& options = {}) {
   const test::Folder folder;
-  const std::filesystem::path path = folder / "a.serialized";
-  std::ofstream(path, std::ios::binary) << bytes;
-  return readSerialized(path, index, options);
+  return readSerialized(folder.write("a.serialized", bytes), index, options);
 }
 
 }  // namespace
