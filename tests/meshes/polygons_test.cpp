@@ -1,10 +1,7 @@
-// Polygons, groups and smoothing of meshes in files of all formats.
+// Polygons and smoothing of meshes, and what the readers of all formats report in the same way.
 
 #include <algorithm>
-#include <catch2/catch.hpp>
-
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <numbers>
@@ -14,31 +11,20 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <Eigen/Geometry>
+#include <catch2/catch.hpp>
 
 #include "scenes/meshes/obj.h"
 #include "scenes/meshes/ply.h"
 #include "scenes/meshes/polygon.h"
 #include "scenes/meshes/serialized.h"
-#include "tests/support/scenes_test_tools.h"
+#include "tests/support/meshes_test_tools.h"
+#include "tests/support/tool_run.h"
 
 using namespace lobe;
+using namespace lobe::test;
 using Catch::Matchers::Contains;
 
 namespace {
-
-double areaOf(const TriangleMesh& mesh) {
-  double area = 0;
-  for (const auto& [i, j, k] : mesh.triangles)
-    area += 0.5 * (mesh.positions[j] - mesh.positions[i]).cross(mesh.positions[k] - mesh.positions[i]).norm();
-  return area;
-}
-
-// Code with sanitizers is many times slower.
-#if defined(LOBE_SANITIZED)
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
 
 using Polygon = std::vector<Vec2>;
 
@@ -154,19 +140,10 @@ std::vector<Triangle> clippedEars(const Corners& corners) {
   return triangles;
 }
 
-std::string faultOfReading(const auto& read) {
-  try {
-    read();
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "";
-}
-
 }  // namespace
 
 TEST_CASE("scenes: concave polygons in PLY and OBJ keep their area for every first corner") {
-  const TestFolder folder;
+  const Folder folder;
   const std::vector<std::pair<Polygon, double>> shapes = {
       {{{-0.8f, -0.8f}, {0, 0}, {0.8f, -0.8f}, {0, 0.2f}}, 0.16},            // dart
       {{{0, 0}, {2, 0}, {2, 0.5f}, {0.5f, 0.5f}, {0.5f, 2}, {0, 2}}, 1.75},  // L
@@ -243,90 +220,8 @@ TEST_CASE("scenes: polygons are triangulated as by testing each corner against a
   }
 }
 
-TEST_CASE("scenes: an OBJ with many texture coordinates at a position is read in linear time") {
-  constexpr int kFaces = 100000;
-  std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
-  for (int i = 0; i < 2 * kFaces; ++i) text += fmt::format("vt {} 0\n", i);
-  for (int i = 0; i < kFaces; ++i) text += fmt::format("f 1/{} 2/{} 3/1\n", 2 * i + 1, 2 * i + 2);
-  text += "f 1/1 2/2 3/1\n";
-  const TestFolder folder;
-  const std::filesystem::path path = folder.write("a.obj", text);
-  const auto start = std::chrono::steady_clock::now();
-  const TriangleMesh mesh = readObj(path, {});
-  const std::chrono::duration<double> time = std::chrono::steady_clock::now() - start;
-  if (!kSanitized) CHECK(time.count() < 5);
-  CHECK(mesh.positions.size() == 2 * kFaces + 1);
-  // Vertices are in the order in which faces mention them first.
-  CHECK(mesh.triangles[0] == std::array<std::uint32_t, 3>{0, 1, 2});
-  CHECK(mesh.triangles[1] == std::array<std::uint32_t, 3>{3, 4, 2});
-  CHECK(mesh.triangles.back() == mesh.triangles[0]);
-  CHECK(mesh.uvs[4].x() == 3);
-}
-
-TEST_CASE("scenes: an OBJ is split into many materials in linear time") {
-  constexpr int kMaterials = 100000;
-  std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 2 0\nf 1 2 3\n";
-  ObjSelection selection;
-  for (int i = 0; i < kMaterials; ++i) {
-    selection.materials.push_back(fmt::format("material {}", i));
-    text += fmt::format("usemtl material {}\nf 1 2 4\n", i);
-  }
-  selection.materials.push_back("material 0");  // the first one of a name has the faces
-  const TestFolder folder;
-  const std::filesystem::path path = folder.write("a.obj", text);
-  const auto start = std::chrono::steady_clock::now();
-  const std::vector<TriangleMesh> meshes = readObjByMaterial(path, {}, selection);
-  const std::chrono::duration<double> time = std::chrono::steady_clock::now() - start;
-  if (!kSanitized) CHECK(time.count() < 5);
-  REQUIRE(meshes.size() == kMaterials + 2);
-  CHECK(areaOf(meshes.front()) == Approx(1));
-  CHECK(areaOf(meshes[kMaterials - 1]) == Approx(1));
-  CHECK(meshes[kMaterials].triangles.empty());
-  CHECK(areaOf(meshes.back()) == Approx(0.5));
-}
-
-TEST_CASE("scenes: PLY faces may precede vertices") {
-  const TestFolder folder;
-  const TriangleMesh mesh = readPly(
-      folder.write("a.ply",
-                   "ply\nformat ascii 1.0\nelement face 1\nproperty list int int vertex_indices\nelement vertex 4\n"
-                   "property float x\nproperty float y\nproperty float z\nend_header\n4 0 1 2 3\n"
-                   "-0.8 -0.8 0\n0 0 0\n0.8 -0.8 0\n0 0.2 0\n"),
-      {});
-  CHECK(areaOf(mesh) == Approx(0.16));
-}
-
-TEST_CASE("scenes: PLY texture coordinates of faces are read") {
-  const TestFolder folder;
-  const auto ply = [&](const std::string& name, const std::string& faces) {
-    return folder.write(
-        "a.ply",
-        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
-        "property float s\nproperty float t\nelement face 2\nproperty list uchar int vertex_indices\n"
-        "property list uchar float " +
-            name + "\nproperty int texnumber\nend_header\n0 0 0 9 9\n1 0 0 9 9\n1 1 0 9 9\n0 1 0 9 9\n" + faces);
-  };
-  for (const std::string name : {"texcoord", "texture_uv"}) {
-    // The second triangle shows another part of the image, except at the corner at vertex 2.
-    const TriangleMesh mesh =
-        readPly(ply(name, "3 0 1 2 6 0 0 0.5 0 0.5 0.5 0\n3 0 2 3 6 0.25 0 0.5 0.5 0.25 0.75 0\n"), {});
-    REQUIRE(mesh.triangles == std::vector<std::array<std::uint32_t, 3>>{{0, 1, 2}, {3, 2, 4}});
-    REQUIRE(mesh.uvs.size() == 5);
-    CHECK(mesh.uvs[1] == Vec2(0.5f, 0));
-    CHECK(mesh.uvs[3] == Vec2(0.25f, 0));
-    CHECK(mesh.uvs[4] == Vec2(0.25f, 0.75f));
-    CHECK(mesh.positions[3] == Vec3(0, 0, 0));
-  }
-  CHECK(readPly(ply("texcoord", "3 0 1 2 0 0\n3 0 2 3 0 0\n"), {}).uvs[3] == Vec2(0, 0));
-  const auto fault = [&](const std::string& faces) {
-    return faultOfReading([&] { readPly(ply("texcoord", faces), {}); });
-  };
-  CHECK_THAT(fault("3 0 1 2 4 0 0 1 1 0\n3 0 2 3 0 0\n"), Contains("3 corners has 4 texture coordinate"));
-  CHECK_THAT(fault("3 0 1 2 6 0 0 1 1 1 nan 0\n3 0 2 3 0 0\n"), Contains("not a finite number"));
-}
-
 TEST_CASE("scenes: normals are smooth only across edges below maxSmoothAngle") {
-  const TestFolder folder;
+  const Folder folder;
   const std::filesystem::path path = folder.write("a.obj", hinge(40) + "f 1 2 3 4\nf 5 1 4 6\n");
   CHECK(largestTurn(readObj(path, {})) == Approx(20));
   const TriangleMesh creased = readObj(path, smoothUpTo(39));
@@ -338,7 +233,7 @@ TEST_CASE("scenes: normals are smooth only across edges below maxSmoothAngle") {
 }
 
 TEST_CASE("scenes: maxSmoothAngle compares positions instead of indices and ignores the normals of the file") {
-  const TestFolder folder;
+  const Folder folder;
   // The second square has its own vertices, and all vertices have a wrong normal.
   const std::string text = hinge(40) + "v 0 0 0\nv 0 1 0\nvn 1 0 0\nf 1//1 2//1 3//1 4//1\nf 5//1 7//1 8//1 6//1\n";
   const std::filesystem::path path = folder.write("a.obj", text);
@@ -353,7 +248,7 @@ TEST_CASE("scenes: maxSmoothAngle compares positions instead of indices and igno
 }
 
 TEST_CASE("scenes: the normals of an OBJ are smooth within its groups as in Mitsuba") {
-  const TestFolder folder;
+  const Folder folder;
   const std::filesystem::path path = folder.write("a.obj", hinge(40) + "g a\nf 1 2 3 4\ng b\nf 5 1 4 6\n");
   const auto turn = [&](ObjGrouping grouping) {
     const auto meshes = readObjByMaterial(path, {}, {{}, -1, grouping});
@@ -366,31 +261,8 @@ TEST_CASE("scenes: the normals of an OBJ are smooth within its groups as in Mits
   CHECK(turn(ObjGrouping::collapsed) == Approx(20));
 }
 
-TEST_CASE("scenes: the meshes of an OBJ are numbered as in Mitsuba 0.6") {
-  const TestFolder folder;
-  // Neither a second `g` before any face nor `o` begins a mesh, but `usemtl` does.
-  const std::filesystem::path path =
-      folder.write("a.obj",
-                   "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 2 0\nv 0 3 0\nv 0 4 0\ng a\nusemtl one\ng b\nf 1 2 3\no c\nf 1 "
-                   "2 4\nusemtl two\nf 1 2 5\ng d\ng e\nf 1 2 6\n");
-  const auto areas = [&](int mesh, ObjGrouping grouping) {
-    std::vector<double> result;
-    for (const TriangleMesh& part : readObjByMaterial(path, {}, {{"one", "two"}, mesh, grouping}))
-      result.push_back(areaOf(part));
-    return result;
-  };
-  using Areas = std::vector<double>;
-  CHECK(areas(-1, ObjGrouping::separate) == Areas{1.5, 3.5, 0});
-  CHECK(areas(0, ObjGrouping::separate) == Areas{1.5, 0, 0});
-  CHECK(areas(1, ObjGrouping::joined) == Areas{0, 1.5, 0});
-  CHECK(areas(2, ObjGrouping::separate) == Areas{0, 2, 0});
-  CHECK(areas(-1, ObjGrouping::collapsed) == Areas{0, 5, 0});
-  CHECK_THAT(faultOfReading([&] { areas(3, ObjGrouping::separate); }),
-             Contains("a.obj: there is no mesh 3: the file has 3, counted from 0"));
-}
-
 TEST_CASE("scenes: all mesh readers report in the same way why a file cannot be opened") {
-  const TestFolder folder;
+  const Folder folder;
   for (const std::string type : {"obj", "ply", "serialized"}) {
     const auto fault = [&](const std::filesystem::path& path) {
       return faultOfReading([&] {
@@ -407,7 +279,7 @@ TEST_CASE("scenes: all mesh readers report in the same way why a file cannot be 
 }
 
 TEST_CASE("scenes: a vertex that is too far away is rejected") {
-  const TestFolder folder;
+  const Folder folder;
   const auto fault = [&](const std::string& x) {
     return faultOfReading([&] { readObj(folder.write("a.obj", "v 0 0 0\nv " + x + " 0 0\nv 0 1 0\nf 1 2 3\n"), {}); });
   };

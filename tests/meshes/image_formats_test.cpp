@@ -1,0 +1,196 @@
+// Image files of all formats: their pixels, and what is reported about damaged files.
+
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfOutputFile.h>
+#include <catch2/catch.hpp>
+
+#include "runtime/image/image.h"
+#include "tests/support/meshes_test_tools.h"
+#include "tests/support/picture_files.h"
+#include "tests/support/tool_run.h"
+
+using namespace lobe;
+using namespace lobe::test;
+using Catch::Matchers::Contains;
+
+namespace {
+
+using Imath::Box2i;
+using Imath::V2i;
+
+/// Pixel (x, y) of channel c is 100·c + 10·y + x, in the coordinates of the data window.
+void writeExr(const std::filesystem::path& path, const std::vector<std::string>& channels, Imf::PixelType type,
+              const Box2i& display, const Box2i& data, Imf::Compression compression = Imf::ZIP_COMPRESSION) {
+  Imf::Header header(display, data);
+  header.compression() = compression;
+  const int width = data.max.x - data.min.x + 1, height = data.max.y - data.min.y + 1;
+  std::vector<std::vector<float>> planes;
+  std::vector<std::vector<half>> halves;
+  Imf::FrameBuffer frame;
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    header.channels().insert(channels[c], Imf::Channel(type));
+    planes.emplace_back();
+    for (int y = data.min.y; y <= data.max.y; ++y)
+      for (int x = data.min.x; x <= data.max.x; ++x) planes[c].push_back(100.0f * c + 10.0f * y + x);
+    halves.emplace_back(planes[c].begin(), planes[c].end());
+  }
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    const bool isHalf = type == Imf::HALF;
+    const std::size_t size = isHalf ? sizeof(half) : sizeof(float);
+    char* base = isHalf ? reinterpret_cast<char*>(halves[c].data()) : reinterpret_cast<char*>(planes[c].data());
+    base -= static_cast<std::ptrdiff_t>(size) * (data.min.x + data.min.y * width);
+    frame.insert(channels[c], Imf::Slice(type, base, size, size * width));
+  }
+  Imf::OutputFile file(path.c_str(), header);
+  file.setFrameBuffer(frame);
+  file.writePixels(height);
+}
+
+Box2i box(int left, int top, int right, int bottom) {
+  return {V2i(left, top), V2i(right, bottom)};
+}
+
+/// 2×2 pixels: black, a grey of code 128; red, white.
+const std::vector<std::uint8_t> kCodes = {0, 0, 0, 128, 128, 128, 255, 0, 0, 255, 255, 255};
+
+}  // namespace
+
+TEST_CASE("materials: 8-bit images are decoded with the requested encoding") {
+  const Folder folder;
+  for (const std::string type : {"png", "bmp", "tga"}) {
+    CAPTURE(type);
+    const Image image = readImage(folder.write("a." + type, pictureFile(type, 2, 2, kCodes)));
+    REQUIRE(image.width == 2);
+    REQUIRE(image.height == 2);
+    requireNear(image.at(0, 0), grey(0));
+    requireNear(image.at(1, 0), grey(0.2158605f));
+    requireNear(image.at(0, 1), Rgb(1, 0, 0));
+    requireNear(image.at(1, 1), grey(1));
+  }
+  const std::filesystem::path png = folder / "a.png";
+  requireNear(readImage(png, {Encoding::Kind::linear}).at(1, 0), grey(128 / 255.0f));
+  requireNear(readImage(png, {Encoding::Kind::gamma, 2.0f}).at(1, 0), grey(128 * 128 / 65025.0f));
+}
+
+TEST_CASE("materials: JPEG and HDR images are read") {
+  const Folder folder;
+  const std::vector<std::uint8_t> flat(16 * 16 * 3, 128);
+  requireNear(readImage(folder.write("a.jpg", pictureFile("jpg", 16, 16, flat))).at(7, 9), grey(0.2158605f), 0.01f);
+
+  std::vector<float> values(16 * 4 * 3);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = 0.25f * static_cast<float>(i / 3 % 16);
+  const std::filesystem::path hdr = folder.write("a.hdr", hdrFile(16, 4, values));
+  for (const Encoding::Kind kind : {Encoding::Kind::srgb, Encoding::Kind::gamma})
+    requireNear(readImage(hdr, {kind, 2.2f}).at(9, 2), grey(2.25f), 0.02f);
+}
+
+TEST_CASE("materials: EXR images of half and float with colour and luminance") {
+  const Folder folder;
+  const std::filesystem::path path = folder / "a.exr";
+  for (const Imf::PixelType type : {Imf::HALF, Imf::FLOAT})
+    for (const Imf::Compression compression : {Imf::NO_COMPRESSION, Imf::ZIP_COMPRESSION, Imf::PIZ_COMPRESSION}) {
+      writeExr(path, {"R", "G", "B", "A"}, type, box(0, 0, 4, 2), box(0, 0, 4, 2), compression);
+      const Image image = readImage(path);
+      REQUIRE(image.width == 5);
+      REQUIRE(image.height == 3);
+      for (int y = 0; y < 3; ++y)
+        for (int x = 0; x < 5; ++x) requireNear(image.at(x, y), 10.0f * y + x + Rgb(0, 100, 200), 0);
+    }
+  writeExr(path, {"Y"}, Imf::FLOAT, box(0, 0, 4, 2), box(0, 0, 4, 2));
+  requireNear(readImage(path).at(3, 2), grey(23), 0);
+  writeExr(path, {"Z", "N.X"}, Imf::FLOAT, box(0, 0, 4, 2), box(0, 0, 4, 2));
+  const std::string fault = faultOfReading([&] { readImage(path); });
+  REQUIRE_THAT(fault, Contains("a.exr") && Contains("N.X Z"));
+}
+
+TEST_CASE("materials: an EXR image has the size of its display window") {
+  const Folder folder;
+  const std::filesystem::path path = folder / "a.exr";
+  writeExr(path, {"R", "G", "B"}, Imf::FLOAT, box(0, 0, 3, 3), box(1, 2, 2, 5));  // overlaps the lower edge
+  const Image cropped = readImage(path);
+  REQUIRE(cropped.width == 4);
+  REQUIRE(cropped.height == 4);
+  for (int y = 0; y < 4; ++y)
+    for (int x = 0; x < 4; ++x) {
+      const bool there = x >= 1 && x <= 2 && y >= 2;
+      requireNear(cropped.at(x, y), there ? Rgb(10.0f * y + x + Rgb(0, 100, 200)) : grey(0), 0);
+    }
+  writeExr(path, {"Y"}, Imf::FLOAT, box(5, 6, 7, 8), box(5, 6, 7, 8));  // the same area, away from the origin
+  requireNear(readImage(path).at(0, 0), grey(65), 0);
+  writeExr(path, {"Y"}, Imf::FLOAT, box(0, 0, 2, 2), box(5, 6, 7, 8));  // disjoint
+  requireNear(readImage(path).at(1, 1), grey(0), 0);
+}
+
+TEST_CASE("materials: damaged images are rejected with their name") {
+  const Folder folder;
+  const std::filesystem::path exr = folder / "whole.exr";
+  writeExr(exr, {"R", "G", "B"}, Imf::FLOAT, box(0, 0, 40, 40), box(0, 0, 40, 40));
+  const std::string bytes = readFile(exr);
+  for (const double fraction : {0.01, 0.1, 0.5, 0.9, 0.999}) {
+    const std::filesystem::path path =
+        folder.write("cut.exr", bytes.substr(0, static_cast<std::size_t>(fraction * bytes.size())));
+    CAPTURE(fraction);
+    REQUIRE_THAT(faultOfReading([&] { readImage(path); }), Contains("cut.exr") && !Contains("\n"));
+  }
+  const std::string cut = pictureFile("png", 64, 64, std::vector<std::uint8_t>(64 * 64 * 3, 128)).substr(0, 60);
+  REQUIRE_THAT(faultOfReading([&] { readImage(folder.write("cut.png", cut)); }), Contains("cut.png"));
+  REQUIRE_THAT(faultOfReading([&] { readImage(folder.write("empty.png", "")); }), Contains("empty.png"));
+  REQUIRE_THAT(faultOfReading([&] { readImage(folder.write("text.jpg", "no image")); }), Contains("text.jpg"));
+  REQUIRE_THAT(faultOfReading([&] { readImage(folder / "missing.png"); }), Contains("missing.png: no such file"));
+  REQUIRE_THAT(faultOfReading([&] { readImage(folder / "."); }), Contains("not a file"));
+}
+
+TEST_CASE("materials: truncated images of all formats are rejected") {
+  const Folder folder;
+  std::map<std::string, std::string> files = {
+      {"coded.hdr", hdrFile(64, 64, std::vector<float>(64 * 64 * 3, 0.5f))},
+      {"plain.hdr", hdrFile(4, 400, std::vector<float>(4 * 400 * 3, 0.5f))}};  // too narrow for run lengths
+  for (const std::string type : {"png", "jpg", "bmp", "tga"})
+    files["a." + type] = pictureFile(type, 64, 64, noiseCodes(64, 64));
+  for (const auto& [name, bytes] : files) {
+    CAPTURE(name);
+    REQUIRE_NOTHROW(readImage(folder.write(name, bytes)));
+    for (const double fraction : {0.001, 0.1, 0.5, 0.9}) {
+      const std::filesystem::path cut =
+          folder.write("cut-" + name, bytes.substr(0, static_cast<std::size_t>(fraction * bytes.size())));
+      REQUIRE_THAT(faultOfReading([&] { readImage(cut); }), Contains("cut-"));
+    }
+  }
+}
+
+TEST_CASE("materials: a small EXR file that claims a large image is rejected before memory is allocated") {
+  const Folder folder;
+  const std::filesystem::path exr = folder / "small.exr";
+  writeExr(exr, {"Y"}, Imf::HALF, box(0, 0, 9, 9), box(0, 0, 9, 9));
+  std::string bytes = readFile(exr);
+  const std::size_t window = bytes.find("dataWindow") + std::strlen("dataWindow.box2i.size");
+  const std::int32_t right = 9999999;
+  std::memcpy(&bytes[window + 2 * sizeof(right)], &right, sizeof(right));
+  REQUIRE_THAT(faultOfReading([&] { readImage(folder.write("claim.exr", bytes)); }),
+               Contains("claim.exr: a file of") && Contains("cannot contain 10000000x10 pixels"));
+}
+
+TEST_CASE("materials: flipped bits in an EXR file never crash") {
+  const Folder folder;
+  const std::filesystem::path exr = folder / "whole.exr";
+  writeExr(exr, {"R", "G", "B"}, Imf::HALF, box(0, 0, 9, 9), box(0, 0, 9, 9));
+  const std::string bytes = readFile(exr);
+  int refused = 0;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::string damaged = bytes;
+    damaged[i] = static_cast<char>(damaged[i] ^ (1 << i % 8));
+    const std::string fault = faultOfReading([&] { readImage(folder.write("bad.exr", damaged)); });
+    if (!fault.empty()) ++refused;
+    if (!fault.empty()) REQUIRE_THAT(fault, Contains("bad.exr"));
+  }
+  REQUIRE(refused > 10);
+}
