@@ -5,6 +5,8 @@
 #include <atomic>
 #include <filesystem>
 #include <map>
+#include <optional>
+#include <set>
 #include <string>
 #include <variant>
 #include <vector>
@@ -48,48 +50,32 @@ bool equal(const Image& a, const Image& b) {
   return std::ranges::equal(a.pixels, b.pixels, [](const Rgb& x, const Rgb& y) { return (x == y).all(); });
 }
 
-/// A kind of render: what it changes in the job of quickJobIn.
+/// What a kind of render changes in the job of quickJobIn.
 struct Render {
   const char* name;
-  void (*set)(RenderJob& job);
+  IntegratorKind integrator = IntegratorKind::product;
+  bool hasIllumination = true, hasCheckpoint = true;  ///< whether the job saves them
+  BdptGuide guide = BdptGuide::none;
+  std::optional<ReconstructionNorm> gradients = std::nullopt;
+  std::set<Aov> aovs = {};
 };
 
 const std::vector<Render> kRenders{
-    {"product", [](RenderJob&) {}},
-    {"guided", [](RenderJob& job) { job.integrator = IntegratorKind::guided; }},
-    {"bdpt",
-     [](RenderJob& job) {
-       job.integrator = IntegratorKind::bdpt;
-       job.saveIllumination.clear();
-     }},
-    {"guided bdpt",
-     [](RenderJob& job) {
-       job.integrator = IntegratorKind::bdpt;
-       job.guide = BdptGuide::illumination;
-     }},
-    {"vcm",
-     [](RenderJob& job) {
-       job.integrator = IntegratorKind::vcm;
-       job.saveIllumination.clear();
-     }},
-    {"gradients",
-     [](RenderJob& job) {
-       job.gradients = ReconstructionNorm::l2;
-       job.checkpoint.clear();
-     }},
-    {"gradients of bdpt",
-     [](RenderJob& job) {
-       job.integrator = IntegratorKind::bdpt;
-       job.gradients = ReconstructionNorm::l1;
-       job.saveIllumination.clear();
-       job.checkpoint.clear();
-     }},
-    {"AOVs",
-     [](RenderJob& job) {
-       job.integrator = IntegratorKind::path;
-       job.aovs = {Aov::albedo, Aov::normal, Aov::depth, Aov::variance, Aov::samples};
-       job.saveIllumination.clear();
-     }},
+    {.name = "product"},
+    {.name = "guided", .integrator = IntegratorKind::guided},
+    {.name = "bdpt", .integrator = IntegratorKind::bdpt, .hasIllumination = false},
+    {.name = "guided bdpt", .integrator = IntegratorKind::bdpt, .guide = BdptGuide::illumination},
+    {.name = "vcm", .integrator = IntegratorKind::vcm, .hasIllumination = false},
+    {.name = "gradients", .hasCheckpoint = false, .gradients = ReconstructionNorm::l2},
+    {.name = "gradients of bdpt",
+     .integrator = IntegratorKind::bdpt,
+     .hasIllumination = false,
+     .hasCheckpoint = false,
+     .gradients = ReconstructionNorm::l1},
+    {.name = "AOVs",
+     .integrator = IntegratorKind::path,
+     .hasIllumination = false,
+     .aovs = {Aov::albedo, Aov::normal, Aov::depth, Aov::variance, Aov::samples}},
 };
 
 int injectInto(Countdown& countdown, const std::string& name, const RenderJob& job) {
@@ -106,6 +92,17 @@ RenderJob quickJobIn(const fs::path& folder) {
   return job;
 }
 
+RenderJob quickJobIn(const fs::path& folder, const Render& render) {
+  RenderJob job = quickJobIn(folder);
+  job.integrator = render.integrator;
+  job.guide = render.guide;
+  job.gradients = render.gradients;
+  job.aovs = render.aovs;
+  if (!render.hasIllumination) job.saveIllumination.clear();
+  if (!render.hasCheckpoint) job.checkpoint.clear();
+  return job;
+}
+
 int injectIntoResumed(Countdown& countdown, const fs::path& folder) {
   RenderJob first = quickJobIn(folder);
   first.samples = 1;
@@ -119,12 +116,15 @@ int injectIntoResumed(Countdown& countdown, const fs::path& folder) {
   return injectInto(countdown, "resume", rest);
 }
 
-void injectIntoAll(Countdown& countdown, const SceneFolder& folder) {
-  for (const Render& render : kRenders) {
-    RenderJob job = quickJobIn(folder.path());
-    render.set(job);
-    CHECK(injectInto(countdown, render.name, job) > 0);
-  }
+int injectIntoAuto(Countdown& countdown) {
+  const SceneFolder folder(true);
+  return injectInto(countdown, "auto", jobIn(folder.path()));
+}
+
+void injectIntoAll(Countdown& countdown) {
+  const SceneFolder folder(true);
+  for (const Render& render : kRenders)
+    CHECK(injectInto(countdown, render.name, quickJobIn(folder.path(), render)) > 0);
   CHECK(injectIntoResumed(countdown, folder.path()) > 0);
 }
 
@@ -141,13 +141,11 @@ int injectIntoCompile(Countdown& countdown, const SceneFolder& folder) {
 }  // namespace
 
 TEST_CASE("faults: whichever allocation of a render fails") {
-  const SceneFolder folder(true);
-  CHECK(injectInto(allocations, "auto", jobIn(folder.path())) > 50);
+  CHECK(injectIntoAuto(allocations) > 50);
 }
 
 TEST_CASE("faults: whichever task of a render fails") {
-  const SceneFolder folder(true);
-  CHECK(injectInto(tasks, "auto", jobIn(folder.path())) > 10);
+  CHECK(injectIntoAuto(tasks) > 10);
 }
 
 TEST_CASE("faults: an allocation that fails while rendering does not lose the samples so far") {
@@ -200,21 +198,20 @@ TEST_CASE("faults: an allocation that fails while rendering does not lose the sa
 }
 
 TEST_CASE("faults: whichever write or read of a render fails") {
-  const SceneFolder folder(true);
-  CHECK(injectInto(writes, "auto", jobIn(folder.path())) > 5);
-  CHECK(injectInto(reads, "auto", jobIn(folder.path())) > 0);
+  CHECK(injectIntoAuto(writes) > 5);
+  CHECK(injectIntoAuto(reads) > 0);
 }
 
 TEST_CASE("faults: whichever write or read of any kind of render fails") {
-  for (Countdown* countdown : {&writes, &reads}) injectIntoAll(*countdown, SceneFolder(true));
+  for (Countdown* countdown : {&writes, &reads}) injectIntoAll(*countdown);
 }
 
 TEST_CASE("faults: whichever allocation of any kind of render fails") {
-  injectIntoAll(allocations, SceneFolder(true));
+  injectIntoAll(allocations);
 }
 
 TEST_CASE("faults: whichever task of any kind of render fails") {
-  injectIntoAll(tasks, SceneFolder(true));
+  injectIntoAll(tasks);
 }
 
 TEST_CASE("faults: whichever allocation or task of a compilation fails") {
