@@ -1,7 +1,5 @@
 // Files with several faults, files for older versions, and encodings: what is reported, and what is read nevertheless.
 
-#include <chrono>
-
 #include <fmt/format.h>
 #include <catch2/catch.hpp>
 
@@ -264,18 +262,18 @@ TEST_CASE("scenes: small files that would expand exponentially are rejected") {
   CHECK_THROWS_WITH(readScene(folder.path() / "0.xml"), Catch::Contains("more than 1000 <include>s"));
 }
 
+// Counting the column of each fault from the start of the line would take far longer than the time limit of a test.
 TEST_CASE("scenes: many faults in a single line take neither much time nor much memory") {
-  std::string body;
+  const std::string comment = "<!--" + std::string(50000000, 'a') + "-->";
+  std::string body = comment;
   for (int i = 0; i < 20000; ++i) body += fmt::format("<default name=\"a{:05}\" value=\"\xc3\xa4\"/>", i);
   for (int i = 0; i < 100000; ++i) body += "<bsdf type=\"$none\"/>";
-  const auto start = std::chrono::steady_clock::now();
   const SceneCheck found = check(sceneOf(body));
-  const std::chrono::duration<double> time = std::chrono::steady_clock::now() - start;
-  CHECK(time.count() < 20);
   REQUIRE(found.faults.size() == 1);
   CHECK(found.faults[0].count == 100000);
   // Each <default> has 34 characters, one of which has two bytes.
-  CHECK_THAT(found.faults[0].text(), Catch::Contains("test.xml:2:680001: $none is not defined"));
+  const std::size_t column = comment.size() + 20000 * 34 + 1;
+  CHECK_THAT(found.faults[0].text(), Catch::Contains(fmt::format("test.xml:2:{}: $none is not defined", column)));
   CHECK_THAT(found.faults[0].text(), Catch::Contains("defined are a00000, a00001, ") &&
                                          Catch::Contains(", a00009 and 19990 more") && !Catch::Contains("a00010"));
 }
@@ -316,24 +314,22 @@ TEST_CASE("scenes: columns are counted in characters, also at the ends of long l
   }
 }
 
+// Searching all notes for each of them would take far longer than the time limit of a test.
 TEST_CASE("scenes: notes are kept once each in their order, also if there are many") {
-  constexpr int kNotes = 200000;
+  constexpr int kNotes = 600000;
   Findings findings;
-  const auto start = std::chrono::steady_clock::now();
   for (int repetition = 0; repetition < 2; ++repetition)
     for (int i = 0; i < kNotes; ++i) {
       findings.note(fmt::format("note {:06}", i));
       findings.noteWithoutEffect(fmt::format("owner {}", i % 2), fmt::format("parameter {:06}", i));
     }
   const std::vector<std::string> notes = findings.notes();
-  const std::chrono::duration<double> time = std::chrono::steady_clock::now() - start;
-  CHECK(time.count() < 20);
   REQUIRE(notes.size() == kNotes + 1);
   CHECK(notes[0] == "note 000000");
-  CHECK(notes[kNotes - 1] == "note 199999");
+  CHECK(notes[kNotes - 1] == "note 599999");
   CHECK_THAT(notes.back(), Catch::Contains(": parameter 000000, parameter 000002, ") &&
-                               Catch::Contains(", parameter 199998 of owner 0; parameter 000001, ") &&
-                               Catch::EndsWith(", parameter 199999 of owner 1"));
+                               Catch::Contains(", parameter 599998 of owner 0; parameter 000001, ") &&
+                               Catch::EndsWith(", parameter 599999 of owner 1"));
 }
 
 TEST_CASE("scenes: integrators set the maximum depth and the visibility of emitters") {

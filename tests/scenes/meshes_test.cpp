@@ -2,7 +2,6 @@
 
 #include <catch2/catch.hpp>
 
-#include <chrono>
 #include <cmath>
 #include <numbers>
 
@@ -102,20 +101,19 @@ TEST_CASE("scenes: the last material of a name in a library is used") {
   CHECK(isNear(albedoOf(scene, 0), Rgb(0, 0, 1)));
 }
 
+// Searching the library for each material would take far longer than the time limit of a test.
 TEST_CASE("scenes: many materials are looked up in a large library in less than quadratic time") {
+  constexpr int kMaterials = 400000;
   std::string library, obj = "mtllib colours.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n";
-  for (int i = 0; i < 100000; ++i) {
+  for (int i = 0; i < kMaterials; ++i) {
     library += fmt::format("newmtl known {}\n", i);
     obj += fmt::format("usemtl other {}\nf 1 2 3\n", i);
   }
   const ObjScene files(library, obj + "usemtl known 0\nf 1 2 3\n");
-  const auto start = std::chrono::steady_clock::now();
   const Scene scene = files.read();
-  const std::chrono::duration<double> time = std::chrono::steady_clock::now() - start;
-  CHECK(time.count() < 20);
   REQUIRE(scene.shapes.size() == 2);
   CHECK(scene.shapes[0].name == "a.obj:known 0");
-  CHECK(std::get<TriangleMesh>(scene.shapes[1].geometry).triangles.size() == 100000);
+  CHECK(std::get<TriangleMesh>(scene.shapes[1].geometry).triangles.size() == kMaterials);
 }
 
 TEST_CASE("scenes: shape_index selects a mesh of an OBJ") {

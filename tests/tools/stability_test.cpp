@@ -189,7 +189,7 @@ TEST_CASE("tools: a pipe as an input is an error and does not block") {
         "loberender scene.xml --illumination p.lobe -o b.exr --spp 1",
         "loberender scene.xml --resume p.lobe -o b.exr --spp 1", "lobefit p.xml"}) {
     CAPTURE(command);
-    CHECK(runIn(folder, "timeout 20 " + kBin + command + " 2>/dev/null") == "1");
+    CHECK(runIn(folder, kBin + command + " 2>/dev/null") == "1");
   }
 }
 
