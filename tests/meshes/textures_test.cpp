@@ -82,9 +82,10 @@ TEST_CASE("materials: the coordinates of a bitmap are scaled and then shifted") 
 
 TEST_CASE("materials: bitmaps accept extreme coordinates and reject empty images") {
   const TexturePtr texture = makeBitmap(ramp());
-  for (const float odd : {1e30f, -std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
-    REQUIRE(texture->eval({odd, 0.5f}).allFinite());
-    REQUIRE(texture->eval({0.5f, odd}).allFinite());
+  for (const float extreme :
+       {1e30f, -std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
+    REQUIRE(texture->eval({extreme, 0.5f}).allFinite());
+    REQUIRE(texture->eval({0.5f, extreme}).allFinite());
   }
   REQUIRE_THROWS_AS(makeBitmap(std::make_shared<Image>()), std::runtime_error);
   REQUIRE_THROWS_AS(makeBitmap(nullptr), std::runtime_error);

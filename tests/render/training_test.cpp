@@ -309,7 +309,7 @@ TEST_CASE("training: nothing is learnt for pictures of emitters alone") {
 namespace {
 
 /// Reports an albedo of 1 whatever the true albedo, so that particles survive with any weight.
-class Boaster : public Diffuse {
+class FullAlbedoDiffuse : public Diffuse {
  public:
   using Diffuse::Diffuse;
   Rgb albedo(const Vec3&, const Vec2&) const override { return grey(1.0f); }
@@ -320,7 +320,7 @@ class Boaster : public Diffuse {
 Moments fluxFromFloor(float albedo, float walls) {
   Scene scene;
   addShape(scene, box({-1, -1, -1}, {1, 1, 1}, true), addMaterial(scene, std::make_shared<Diffuse>(walls)));
-  const int floor = addMaterial(scene, std::make_shared<Boaster>(albedo));
+  const int floor = addMaterial(scene, std::make_shared<FullAlbedoDiffuse>(albedo));
   addShape(scene, rectangle({-1, -0.99f, -1}, {0, 0, 2}, {2, 0, 0}), floor);
   const double cap = 2 * kPi * (1 - std::cos(0.5));  // solid angle of the cone
   const float intensity = static_cast<float>(1 / (cap * albedo));
