@@ -1,5 +1,6 @@
 """What the scripts that measure and show errors have in common."""
 
+import collections
 import importlib.machinery
 import importlib.util
 import json
@@ -45,8 +46,63 @@ def without_imported(summary):
 
 
 def budget_text(budget):
-    kind, amount = budget.split(" ")
-    return f"{amount} s" if kind == "seconds" else f"{amount} samples"
+    kind, _, amount = budget.partition(" ")
+    return {"seconds": f"{amount} s", "spp": f"{amount} samples"}.get(kind, kind)
+
+
+def rows_of(summary):
+    """(scene, budget) → method → its results. Imported pictures stand in all rows of a scene, or in one of their own."""
+    rows = collections.defaultdict(dict)
+    for one in summary:
+        budgets = {other["budget"]: None for other in summary if other["scene"] == one["scene"] and other["budget"] != "imported"}
+        for budget in (budgets or ["imported"]) if one["budget"] == "imported" else [one["budget"]]:
+            rows[one["scene"], budget][one["method"]] = one
+    return rows
+
+
+def methods_of(summary):
+    return list(dict.fromkeys(one["method"] for one in summary))
+
+
+def lowest(of_method):
+    """The methods of a row whose variance is not above the lowest one by more than the uncertainties of both. Imported pictures, which have
+    no budget, are not ranked."""
+    ranked = {method: one for method, one in of_method.items() if one["budget"] != "imported"}
+    best = min(ranked.values(), key=lambda one: one["trimmed"], default=None)
+    return [method for method, one in ranked.items()
+            if one["trimmed"] - (one["trimmed_spread"] or 0) <= best["trimmed"] + (best["trimmed_spread"] or 0)]
+
+
+def digits(number, count=3):
+    """The significant digits of a number, without an exponent unless it is very small; nothing if it is not known."""
+    return "" if number is None else f"{float(f'{number:.{count}g}'):.12g}"
+
+
+def variance(one):
+    """Without the worst pixels, with its uncertainty."""
+    return digits(one["trimmed"]) + (f" ± {digits(one['trimmed_spread'], 1)}" if one["trimmed_spread"] else "")
+
+
+def print_table(header, rows):
+    print("| " + " | ".join(header) + " |\n" + "|---" * len(header) + "|")
+    for row in rows:
+        print("| " + " | ".join(row) + " |")
+
+
+def print_methods(rows, methods, label, text):
+    """A row for each scene and budget, with the lowest in bold."""
+    def cells(of_method):
+        best = lowest(of_method)
+        texts = {method: f"**{text(one)}**" if method in best else text(one) for method, one in of_method.items()}
+        return [texts.get(method, "") for method in methods]
+
+    print_table(["", *methods], [[label(scene, budget), *cells(of_method)] for (scene, budget), of_method in rows.items()])
+
+
+def print_errors(summary):
+    """All budgets, and in brackets the variance of all pixels."""
+    print_methods(rows_of(summary), methods_of(summary), lambda scene, budget: f"{scene}, {budget}",
+                  lambda one: f"{variance(one)} ({digits(one['all'])})")
 
 
 def slope(x, y):

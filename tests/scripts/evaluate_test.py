@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Evaluates with tools that only pretend to render: plan.json has all that is needed to repeat the runs, runs by other caches or of another
-scene are refused, and the tables and drawings of the results are complete.
+"""Evaluates with tools that only pretend to render: plan.json has all that is needed to repeat the runs, an evaluation is continued by the
+same command only, wrong options are found first, and the tables and drawings of the results are complete.
 
 Exits with 77 if Matplotlib is not installed.
 """
@@ -10,14 +10,22 @@ import hashlib
 import json
 import os
 import pathlib
+import pty
+import signal
+import struct
 import subprocess
 import sys
 import tempfile
+import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 SKIPPED = 77
 SCENE = "own-livingroom"
 LONG = "method-whose-name-is-wider-than-its-crop-and-has-a-wordwithouthyphens"
+
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(ROOT / "scripts"))
+import results  # noqa: E402
 
 try:
     import numpy
@@ -53,6 +61,19 @@ def sha256(path):
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
+def rows_of(path):
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def contents(folder):
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def edit(path, **changes):
+    path.write_text(json.dumps(json.loads(path.read_text()) | changes))
+
+
 def command(folder, *more):
     return [folder / "out", "--scenes", SCENE, "--methods", "path", "product-naive", "--method", f"{LONG}=--integrator guided", "--seconds", "8",
             "--build", f"a={folder / 'tools'}", *more]
@@ -72,38 +93,189 @@ def check_plan(folder):
     of_naive = f"caches/a+product-naive/{SCENE}"
     assert plan["caches"][of_naive] == {"a.lobe": sha256(out / of_naive / "a.lobe")}, plan
     assert set(plan["caches"]) == {of_naive, f"caches/a/{SCENE}"}, plan
-    with open(out / "runs.csv", newline="") as file:
-        assert {row["scene_hash"] for row in csv.DictReader(file)} == {"0a"}
+    rows = rows_of(out / "runs.csv")
+    assert {row["scene_hash"] for row in rows} == {"0a"}, rows
+    assert {row["cores"] for row in rows} == {str(plan["machine"]["cores"])} and {row["cpu"] for row in rows} == {plan["machine"]["cpu"]}, rows
+    assert all(float(row["processor_seconds"]) > 0 for row in rows), rows
+    order = [(row["seed"], row["method"]) for row in sorted(rows, key=lambda row: row["started"])]
+    path, naive, other = "a:path", "a:product-naive", f"a:{LONG}"
+    assert order == [("1", path), ("1", naive), ("1", other), ("2", naive), ("2", other), ("2", path)], order
 
 
 def check_refused(folder):
+    """Nothing is overwritten by a command that cannot continue the evaluation."""
     out = folder / "out"
-    before = (out / "plan.json").read_text()
-    made = {path: path.stat().st_mtime_ns for path in out.rglob("*.exr")}
-    errors = run("evaluate", *command(folder), code=1, CACHE="second")
-    assert "with other caches" in errors, errors
-    assert (out / "plan.json").read_text() == before, "the plan is not that of the runs"
-    errors = run("evaluate", *command(folder), "--seeds", "1", "2", "3", code=1, SCENE_HASH="0b")
-    assert "files of the scene have changed" in errors, errors
+    before = contents(out)
+
+    def refused(text, *more, **environment):
+        errors = run("evaluate", *command(folder, *more), code=1, **environment)
+        assert text in errors and "Traceback" not in errors, errors
+        after = contents(out)
+        assert all(after[path] == content for path, content in before.items()), "something is overwritten"
+
+    refused("with other caches", CACHE="second")
+    refused("with the options --size 320x200 --seconds 8 --seed 1 --integrator path, not --size 320x200 --seconds 8 --seed 1 --threads 1 ",
+            "--threads", "1")
+    refused("files of the scene have changed", "--seeds", "1", "2", "3", SCENE_HASH="0b")
+    refused("files of the scene have changed", "--method", "other=--integrator path", SCENE_HASH="0b")
+    of_path = out / "runs" / SCENE / "a_path-s8-1"
+    record, statistics = pathlib.Path(f"{of_path}.run"), pathlib.Path(f"{of_path}.json")
+    for file, text, changes in ((record, "on 1000 cores, not ", {"cores": 1000}), (record, "on another machine, none, not ", {"cpu": "none"}),
+                                (record, "by another loberender", {"loberender": "0"}),
+                                (statistics, "files of the scene have changed", {"scene_hash": "0b"})):
+        edit(file, **changes)
+        of_other, before[file] = before[file], file.read_bytes()
+        refused(text, "--seeds", "1", "2", "4")
+        assert not list(out.rglob("*-4.exr")), "something is rendered before"
+        before[file] = of_other
+        file.write_bytes(of_other)
+
+
+def check_continued(folder):
+    """Complete runs are not repeated, whatever the path of the folder."""
+    out = folder / "out"
+    times = {path.name: path.stat().st_mtime_ns for path in out.rglob("*.exr")}
+    moved = folder / "moved" / "out"
+    moved.parent.mkdir()
+    out.rename(moved)
+    missing = next(path for path in moved.rglob("*.exr") if path.stem.endswith("path-s8-2"))
+    missing.unlink()
+    record = next(moved.rglob("*path-s8-1.run"))
+    known = json.loads(record.read_text())
+    record.write_text(json.dumps({key: known[key] for key in ("command", "loberender", "scene", "caches")}))  # as those of older versions
+    run("evaluate", os.path.relpath(moved), *command(folder)[1:])
+    moved.rename(out)
     run("evaluate", *command(folder))
-    assert all(path.stat().st_mtime_ns == when for path, when in made.items()), "complete runs are repeated"
+    repeated = {path.name for path in out.rglob("*.exr") if times.get(path.name) != path.stat().st_mtime_ns}
+    assert repeated == {missing.name}, repeated
+
+
+def check_interrupted(folder):
+    out = folder / "interrupted"
+    arguments = [str(part) for part in (ROOT / "scripts/evaluate", out, *command(folder)[1:], "--jobs", "2")]
+    environment = os.environ | {"CACHE": "first", "SCENE_HASH": "0a", "RENDER_SECONDS": "60"}
+    for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
+        process = subprocess.Popen(arguments, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        while "0 of 6 runs" not in process.stderr.readline():
+            assert process.poll() is None, "no runs are begun"
+        time.sleep(0.3)  # until the tools are started
+        process.send_signal(number)
+        _, errors = process.communicate(timeout=20)  # not those of the tools
+        assert process.returncode == code, (process.returncode, errors)
+        assert errors == "interrupted; run the same command again to continue\n", errors
+
+
+def check_progress(folder):
+    controller, terminal = pty.openpty()
+    arguments = [str(part) for part in (ROOT / "scripts/evaluate", *command(folder))]
+    subprocess.run(arguments, env=os.environ | {"CACHE": "first", "SCENE_HASH": "0a"}, check=True, stdout=subprocess.DEVNULL, stderr=terminal)
+    shown = os.read(controller, 1 << 16).decode()
+    assert f"compiling the BRDF caches of {SCENE}, 2 of 2" in shown and f"comparing the pictures of {SCENE}" in shown, shown
+    assert shown.endswith("\r\033[K"), "the line of the progress is not ended"
+    evaluate = results.load_evaluate()
+    slow, fast, timed = (evaluate.Run(SCENE, method, budget, 1) for method, budget in (
+        ("product", ("--spp", "4")), ("path", ("--spp", "8")), ("path", ("--seconds", "60"))))
+    left = evaluate.TimeLeft()
+    assert left.text([slow], 1) == "" and left.text([timed], 1) == ", 1 min left", "the time of samples is not known before"
+    left.add(slow, 240)
+    assert left.text([slow, timed], 1) == ", 5 min left" and left.text([fast, fast], 2) == ", 8 min left", "not like the other method"
+    left.add(fast, 60)
+    assert left.text([fast], 1) == ", 1 min left" and left.text([slow], 1) == ", 4 min left", "not like the same method"
+
+
+def check_pairs(folder):
+    """All pairs of seeds count, and the uncertainty is not smaller than that of the pictures."""
+    arguments = [folder / "pairs", *command(folder)[1:], "--seeds", "1", "2", "3"]
+    for growth, value, spread in (("0.5", 0.03, 0.01), ("0.01", 0.0202, 0.00202)):
+        run("evaluate", *arguments, RANGE=growth)
+        assert [row["seeds"] for row in rows_of(folder / "pairs/errors.csv")][:3] == ["1 2", "1 3", "2 3"]
+        of_path = next(one for one in results.read_summary(folder / "pairs") if one["method"] == "a:path")
+        assert of_path["pairs"] == 3, of_path
+        assert abs(of_path["trimmed"] - value) < 1e-9 and abs(of_path["trimmed_spread"] - spread) < 1e-9, of_path
+    tiny = {"trimmed": 1, "trimmed_low": None, "trimmed_high": None}
+    assert results.load_evaluate().uncertainty([tiny], "trimmed") is None, "an uncertainty of 0"
 
 
 def check_usage(folder):
-    assert "there is no method 'guided'" in run("evaluate", *command(folder, "--fit", "guided=--quality 0.1"), code=2)
-    assert "no ':' and no '/'" in run("evaluate", *command(folder, "--method", "a:b=--integrator path"), code=2)
+    def wrong(text, *arguments, **environment):
+        errors = run("evaluate", *arguments, code=2, **environment)
+        assert text in errors and "Traceback" not in errors, errors
+
+    def wrong_option(text, *more):
+        wrong(text, *command(folder, *more))
+
+    wrong_option("there is no method 'guided'", "--fit", "guided=--quality 0.1")
+    wrong_option("no ':' and no '/'", "--method", "a:b=--integrator path")
+    wrong_option("No closing quotation", "--method", "b=--integrator 'path")
+    for option in ("--seconds", "--spp", "--seeds", "--threads", "--jobs"):
+        for value in ("0", "nan", "many"):
+            wrong_option(f"{option}: '{value}' is not a positive ", option, value)
+    for option, values in {"--seconds": ("1", "1.0"), "--spp": ("2", "2"), "--seeds": ("1", "2", "1"), "--scenes": (SCENE, SCENE),
+                           "--methods": ("path", "path")}.items():
+        wrong_option("is given twice", option, *values)
+    wrong_option("'path' is given twice", "--method", "path=--integrator bdpt")
+    wrong_option("--build: 'a' is given twice", "--build", "a=elsewhere")
+    wrong_option("is not SCENE=WIDTHxHEIGHT", "--size", "nowhere=10x10")
+    wrong_option("is not SCENE=WIDTHxHEIGHT", "--size", f"{SCENE}=10")
+    wrong_option("nowhere/loberender: no such tool", "--build", "b=nowhere")
+    new = folder / "new"
+    wrong("there is nothing to evaluate", new, "--scenes", SCENE, "--methods", "--build", f"a={folder / 'tools'}")
+    wrong("kitchen/scene.xml: no such scene file", new, "--scenes", "kitchen", LOBE_DATA=str(folder))
+    assert not new.exists()
+
+
+def write_exr(path, width, height):
+    """Only as much of a picture as scripts/evaluate reads itself."""
+    path.write_bytes(b"\x76\x2f\x31\x01\2\0\0\0displayWindow\0box2i\0" + struct.pack("<i4i", 16, 0, 0, width - 1, height - 1))
 
 
 def check_import(folder):
-    peer = folder / "peer"
+    peer, times = folder / "peer", folder / "peer/times.csv"
     peer.mkdir()
-    errors = run("evaluate", *command(folder, "--import", "peer", peer), code=2)
-    assert "has no pictures SCENE-SEED.exr" in errors, errors
-    for seed in (1, 2):
-        (peer / f"{SCENE}-{seed}.exr").write_text("picture")
-    run("evaluate", *command(folder, "--import", "peer", peer))
+
+    def wrong(text, *more):
+        errors = run("evaluate", *command(folder, "--import", "peer", peer, "--seeds", "1", "2", "5", *more), code=2)
+        assert text in errors and "Traceback" not in errors, errors
+        assert not list((folder / "out").rglob("*-5.exr")), "something is rendered"
+
+    wrong("has no pictures SCENE-SEED.exr")
+    pictures = [peer / f"{SCENE}-{seed}.exr" for seed in (1, 2)]
+    write_exr(pictures[0], 320, 200)
+    one = subprocess.run([str(part) for part in (ROOT / "scripts/evaluate", folder / "one", *command(folder, "--import", "peer", peer)[1:])],
+                         capture_output=True, text=True, env=os.environ | {"CACHE": "first", "SCENE_HASH": "0a"})
+    assert one.returncode == 0 and f"warning: --import peer: there is one picture of {SCENE}" in one.stderr, one.stderr
+    pictures[1].write_text("picture")
+    wrong("is not an EXR file")
+    write_exr(pictures[1], 320, 201)
+    wrong("has 320x201 pixels, and the evaluation 320x200")
+    write_exr(pictures[1], 320, 200)
+    wrong("'peer' is given twice", "--import", "peer", peer)
+    wrong("is the name of a method", "--import", "a:path", peer)
+    for text in ("scene,seconds\n,1\n", f"scene,seed,seconds\n{SCENE},1,long\n", f"scene,seed,seconds\n{SCENE},1\n"):
+        times.write_text(text)
+        wrong("times.csv must have the columns scene, seed and seconds")
+    times.write_text(f"scene,seed,seconds\n{SCENE},1,-1\n")
+    wrong("seconds must be positive")
+    times.write_text(f"scene,seed,seconds\n{SCENE},1,3\n{SCENE},2,5\n")
+    shown = run("evaluate", *command(folder, "--import", "peer", peer))
+    assert shown.splitlines()[2] == (f"| {SCENE}, seconds 8 | 0.02 ± 0.002 (0.02) | **0.01 ± 0.001 (0.01)** | **0.0118 ± 0.001 (0.0118)** "
+                                     "| 0.01 ± 0.001 (0.01) |"), shown
     plan = json.loads((folder / "out/plan.json").read_text())
     assert plan["imports"]["peer"][f"{SCENE}-2.exr"] == sha256(peer / f"{SCENE}-2.exr"), plan
+    of_peer = results.read_summary(folder / "out")[-1]
+    assert of_peer["method"] == "peer" and of_peer["seconds_total"] == 4, of_peer
+    assert abs(of_peer["relative_mean"] - 0.7 / 0.925) < 1e-9, of_peer
+    means = {row["method"]: float(row["relative_mean"]) for row in rows_of(folder / "out/errors.csv")}
+    assert abs(means["peer"] - 0.7 / 0.925) < 1e-9 and abs(means["a:path"] - 1 / 0.925) < 1e-9, means
+
+
+def check_import_only(folder):
+    out = folder / "peers"
+    shown = run("evaluate", out, "--scenes", SCENE, "--methods", "--build", f"a={folder / 'tools'}", "--import", "peer", folder / "peer")
+    assert shown.splitlines() == ["|  | peer |", "|---|---|", f"| {SCENE}, imported | 0.01 ± 0.001 (0.01) |"], shown
+    best = run("report", out, "--markdown").split("\n\n")[1].splitlines()
+    assert best[2] == f"| {SCENE}, imported | 0.01 ± 0.001 |", best
+    run("report", out, "--tools", folder / "tools")
 
 
 def check_markdown(folder):
@@ -111,8 +283,10 @@ def check_markdown(folder):
     parts = run("report", folder / "out", "--markdown").split("\n\n")
     assert parts[0].startswith(f"{machine['cpu']}, {machine['cores']} cores;"), parts[0]
     assert parts[1].splitlines() == [f"|  | a:path | a:product-naive | a:{LONG} | peer |", "|---|---|---|---|---|",
-                                     f"| {SCENE}, 8 s | 0.02 | **0.01** | **0.01** | 0.01 |"], parts[1]
-    assert parts[2] == f"Lowest, of 1 scenes: `a:product-naive` in 1, `a:{LONG}` in 1.", parts[2]
+                                     f"| {SCENE}, 8 s | 0.02 ± 0.002 | **0.01 ± 0.001** | **0.0118 ± 0.001** | 0.01 ± 0.001 |"], parts[1]
+    assert parts[2] == (f"Lowest, of 1 scene: `a:product-naive` alone in 0, among the lowest in 1; `a:{LONG}` alone in 0, among the lowest "
+                        "in 1."), parts[2]
+    assert parts[4].splitlines()[-1].endswith(" | 0.757 |"), parts[4]
 
 
 def check_comparison(folder):
@@ -135,6 +309,9 @@ def check_comparison(folder):
 def check_charts(folder):
     run("draw-errors", folder / "out", "--baseline", "a:path", "-o", folder / "errors.svg")
     assert "product-naive" in (folder / "errors.svg").read_text()
+    for option in ("--baseline", "--methods"):
+        errors = run("draw-errors", folder / "out", "--baseline", "a:path", option, "guided", "-o", folder / "none.svg", code=2)
+        assert f"{option}: there are no results of 'guided'; known: a:path, a:product-naive" in errors, errors
     room = folder / "room"
     room.mkdir()
     rows = [f"{10 + n},{n},{0.4 / n},{0.3 / n ** 0.9},1000" for n in range(1, 65)]
@@ -162,7 +339,8 @@ def main():
     with tempfile.TemporaryDirectory(prefix="lobe-evaluate-") as name:
         folder = pathlib.Path(name)
         make_tools(folder / "tools")
-        for check in (check_plan, check_refused, check_usage, check_import, check_markdown, check_comparison, check_charts, check_long_run):
+        for check in (check_plan, check_refused, check_continued, check_interrupted, check_progress, check_pairs, check_usage, check_import,
+                      check_import_only, check_markdown, check_comparison, check_charts, check_long_run):
             check(folder)
             print(check.__name__, "passed", flush=True)
     return 0

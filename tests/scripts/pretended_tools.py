@@ -1,5 +1,6 @@
 """Tools that only pretend to fit, render and compare, for evaluate_test.py. CACHE is the content of every cache, SCENE_HASH the hash of every
-scene."""
+scene, RENDER_SECONDS how long a picture takes. RANGE is how much the relative variance of a pair grows with the sum of its seeds. The
+pictures of a peer are darker."""
 
 import json
 import os
@@ -14,7 +15,7 @@ def loberender(arguments):
         return print("loberender 0.0.0")
     for snapshot in range(3 if "--snapshot-every" in arguments else 1):
         write_outputs(arguments, 1 + snapshot)
-        time.sleep(1 if "--snapshot-every" in arguments else 0)
+        time.sleep(1 if "--snapshot-every" in arguments else float(os.environ.get("RENDER_SECONDS", "0")))
 
 
 def write_outputs(arguments, samples):
@@ -40,9 +41,12 @@ def lobefit(arguments):
 
 
 def lobecompare(arguments):
+    pictures = [word for word in arguments if not word.startswith("--")]
     if "--pair" not in arguments:
-        return print(json.dumps([{"relmse": 0.02}]))
-    value = 0.02 if "/a_path-" in arguments[1] else 0.01
+        return print(json.dumps([{"relmse": 0.02, "mean_ratio": 0.7 if "/peer/" in picture else 1} for picture in pictures[1:]]))
+    seeds = sum(int(pathlib.Path(picture).stem.rpartition("-")[2]) for picture in pictures)
+    value = 0.02 if "/a_path-" in pictures[0] else 0.0118 if "/a_method-" in pictures[0] else 0.01
+    value *= 1 + float(os.environ.get("RANGE", "0")) * (seeds - 3)
     print(json.dumps({"mean_ratio": 1} | {key: number for name in ("relvar", "relvar_drop_1pct", "relvar_drop_0.1pct")
                                           for key, number in ((name, value), (f"{name}_interval", [0.9 * value, 1.1 * value]))}))
 

@@ -53,7 +53,7 @@ def make_page(tools, folder):
     of_these_tools = record.read_text()
     record.write_text(of_these_tools.replace('"loberender": "', '"loberender": "0'))
     other = subprocess.run(evaluate, capture_output=True, text=True)
-    assert other.returncode == 1 and "by other tools" in other.stderr, f"pictures of other tools are mixed: {other.stderr}"
+    assert other.returncode == 1 and "by another loberender" in other.stderr, f"pictures of other tools are mixed: {other.stderr}"
     record.write_text(of_these_tools)
     subprocess.run([ROOT / "scripts/report", out, "--tools", tools, "--chart", ROOT / "docs/charts/slices.svg"], check=True)
     return out / "report.html"
@@ -63,12 +63,15 @@ def check_markdown(out):
     text = subprocess.run([ROOT / "scripts/report", out, "--markdown"], check=True, capture_output=True, text=True).stdout
     machine, best, counts, errors, costs = (part.splitlines() for part in text.split("\n\n"))
     assert " cores; threads of a run: " in machine[0] and "loberender " in machine[0], machine
-    assert len(best) == 2 + 1 and best[2].startswith("| jewelry, 1 s | ") and best[2].count("**") == 2, best
-    assert counts[0].startswith("Lowest, of 1 scenes: `a:"), counts
+    assert len(best) == 2 + 1 and best[2].startswith("| jewelry, 1 s | ") and best[2].count("**") in (2, 4) and best[2].count(" ± ") == 3, best
+    assert counts[0].startswith("Lowest, of 1 scene: `a:"), counts
     assert errors[0] == f"|  | a:path | a:depth-2.0 | {PEER} |" and len(errors) == 2 + 4, errors
     for line in errors[2:]:
-        assert line.count("**") == 2 and "**" not in line.split("|")[-2], f"not one method is the best: {line}"
-    assert "| samples per pixel | rays, millions | mean path length | training, s | memory, MB |" in costs[0], costs
+        assert line.count("**") in (2, 4) and "**" not in line.split("|")[-2], f"no method is the best: {line}"
+    columns = "samples per pixel | rays, millions | mean path length | training, s | memory, MB | mean / mean of all methods"
+    assert costs[0] == f"| scene, budget | method | {columns} |", costs
+    for line in costs[2:]:
+        assert 0 < float(line.split("|")[-2]) < 9, f"not a mean relative to that of nine groups: {line}"
     assert len(costs) == 2 + 9 and any(line.startswith("| jewelry, spp 4 | a:path | 4 | ") for line in costs), costs
 
 
@@ -94,7 +97,21 @@ def check_chart(driver, scene):
     assert len(set(styles)) == 22, "methods look the same"
 
 
+def check_best(driver):
+    """In bold are the lowest variance and those that the uncertainties do not exclude, but no imported pictures."""
+    driver.execute_script("""
+      data.summary = [["a", 1, .2], ["b", 1.4, .3], ["c", 1.6, .3], ["d", .9, null]].map(([method, trimmed, trimmed_spread]) =>
+        ({scene: "s", budget: method === "d" ? "imported" : "spp 1", method, trimmed, trimmed_spread, all: trimmed}));
+      methods.splice(0, Infinity, "a", "b", "c", "d");""")
+    best = driver.execute_script("return [...overview().querySelectorAll('.best')].map(cell => cell.textContent)")
+    assert best == ["1 ± 0.2 (1)", "1.4 ± 0.3 (1.4)"], best
+    driver.execute_script("data.summary = data.summary.slice(3);")
+    assert driver.execute_script("return overview().querySelector('tbody').textContent") == "s imported0.9 (0.9)", "no table of imported pictures"
+    driver.refresh()
+
+
 def check(driver, tools):
+    check_best(driver)
     scene = driver.find_element(By.ID, "jewelry")
     right = scene.find_element(By.CSS_SELECTOR, "img.right")
     assert driver.execute_script("return arguments[0].naturalWidth", right) == 240, "the picture is not shown"
@@ -121,7 +138,7 @@ def check(driver, tools):
     header = [cell.text for cell in driver.find_elements(By.CSS_SELECTOR, "#table th")]
     assert header == ["", "a:path", "a:depth-2.0", PEER], header
     peers = [row.find_elements(By.TAG_NAME, "td")[3].text for row in driver.find_elements(By.CSS_SELECTOR, "#table tbody tr")]
-    assert len(peers) == 4 and len(set(peers)) == 1 and peers[0].endswith(", 1.6 s"), peers
+    assert len(peers) == 4 and len(set(peers)) == 1 and " ± " in peers[0] and peers[0].endswith(", 1.6 s"), peers
     before = scene.find_element(By.CSS_SELECTOR, ".chart svg").get_attribute("outerHTML")
     Select(scene.find_element(By.CSS_SELECTOR, "div:has(> .chart) select")).select_by_index(2)
     assert scene.find_element(By.CSS_SELECTOR, ".chart svg").get_attribute("outerHTML") != before, "the chart does not show the other error"
