@@ -106,7 +106,9 @@ def print_errors(summary):
 
 
 def slope(x, y):
-    """That of the least-squares line through the logarithms."""
-    x, y = [math.log(value) for value in x], [math.log(value) for value in y]
-    mean_x, mean_y = sum(x) / len(x), sum(y) / len(y)
-    return sum((a - mean_x) * (b - mean_y) for a, b in zip(x, y)) / sum((a - mean_x) ** 2 for a in x)
+    """That of the least-squares line through the logarithms of all points with positive coordinates; NaN if there are not two different x."""
+    points = [(math.log(a), math.log(b)) for a, b in zip(x, y) if a > 0 and b > 0]
+    if len({a for a, _ in points}) < 2:
+        return math.nan
+    mean_x, mean_y = (sum(values) / len(points) for values in zip(*points))
+    return sum((a - mean_x) * (b - mean_y) for a, b in points) / sum((a - mean_x) ** 2 for a, _ in points)

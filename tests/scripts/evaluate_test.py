@@ -321,18 +321,51 @@ def check_charts(folder):
     assert "has no tables" in run("draw-long-run", folder, "-o", folder / "none.svg", code=1)
 
 
-def check_long_run(folder):
+def errors_of_long_run(folder, *more, **environment):
+    """The output, and the errors of the snapshots as text."""
     out = folder / "long"
-    shown = run("bench-long-run", out, ROOT / "scenes/livingroom.xml", "2", "--method", "bdpt-gradients", "--tools", folder / "tools")
-    assert "bdpt-gradients: slope 0.000, of the trimmed variance 0.000" in shown, shown
-    assert (out / "bdpt-gradients-1.exr").read_text().count("--integrator bdpt --gradients l2"), "not the options of the method"
+    shown = run("bench-long-run", out, ROOT / "scenes/livingroom.xml", "2", "--method", "bdpt-gradients", "--tools", folder / "tools", *more,
+                **environment)
     with open(out / "bdpt-gradients.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) >= 2 and rows[-1]["spp"] == "3.0", rows
+    return shown, [row["error"] for row in rows]
+
+
+def check_long_run(folder):
+    shown, errors = errors_of_long_run(folder)
+    assert "bdpt-gradients: slope 0.000, of the trimmed variance 0.000" in shown and "no error" not in shown, shown
+    assert (folder / "long/bdpt-gradients-1.exr").read_text().count("--integrator bdpt --gradients l2"), "not the options of the method"
     # Half of the relMSE of both last pictures.
-    assert {float(row["error"]) for row in rows} == {0.01}, rows
-    run("draw-long-run", out, "-o", folder / "long.svg")
+    assert set(map(float, errors)) == {0.01}, errors
+    run("draw-long-run", folder / "long", "-o", folder / "long.svg")
     assert ": 0.00 (0.00)" in (folder / "long.svg").read_text()
+
+
+def check_missing_errors(folder):
+    """The difference of the first snapshots from the other run is less than the error of its last picture."""
+    shown, errors = errors_of_long_run(folder, FIRST_RELMSE="0.005")
+    assert errors[0] == "nan" and set(map(float, errors[1:])) == {0.01}, errors
+    assert f"1 of {len(errors)} snapshots have no error" in shown and "slope 0.000" in shown, shown
+    run("draw-long-run", folder / "long", "-o", folder / "long.svg")
+    assert ": 0.00 (0.00)" in (folder / "long.svg").read_text()
+    # Without two different numbers of samples, there is no slope.
+    (folder / "long/bdpt-gradients.csv").write_text("seconds,spp,error,trimmed,resident_bytes\n1,1,nan,0.1,\n2,2,0.2,0.1,\n")
+    run("draw-long-run", folder / "long", "-o", folder / "long.svg")
+    assert ": nan (0.00)" in (folder / "long.svg").read_text()
+
+
+def check_reference(folder):
+    references = folder / "references"
+    references.mkdir()
+    reference = references / "livingroom.exr"
+    assert "no such file" in run("bench-long-run", folder / "long", SCENE, "2", "--reference", reference, code=2)
+    reference.write_text("picture")
+    _, errors = errors_of_long_run(folder, "--reference", reference)
+    assert set(map(float, errors)) == {0.02}, errors
+    (references / "references.json").write_text(json.dumps([{"scene": "livingroom", "reference": "bdpt", "methods": {"bdpt": {"relvar": 0.005}}}]))
+    _, errors = errors_of_long_run(folder, "--reference", reference)
+    assert all(abs(float(error) - 0.015) < 1e-9 for error in errors), errors
 
 
 def main():
@@ -340,7 +373,7 @@ def main():
         folder = pathlib.Path(name)
         make_tools(folder / "tools")
         for check in (check_plan, check_refused, check_continued, check_interrupted, check_progress, check_pairs, check_usage, check_import,
-                      check_import_only, check_markdown, check_comparison, check_charts, check_long_run):
+                      check_import_only, check_markdown, check_comparison, check_charts, check_long_run, check_missing_errors, check_reference):
             check(folder)
             print(check.__name__, "passed", flush=True)
     return 0

@@ -1,6 +1,6 @@
 """Tools that only pretend to fit, render and compare, for evaluate_test.py. CACHE is the content of every cache, SCENE_HASH the hash of every
-scene, RENDER_SECONDS how long a picture takes. RANGE is how much the relative variance of a pair grows with the sum of its seeds. The
-pictures of a peer are darker."""
+scene, RENDER_SECONDS how long a picture takes. RANGE is how much the relative variance of a pair grows with the sum of its seeds. FIRST_RELMSE
+is the error of the first snapshots. The pictures of a peer are darker."""
 
 import json
 import os
@@ -43,7 +43,8 @@ def lobefit(arguments):
 def lobecompare(arguments):
     pictures = [word for word in arguments if not word.startswith("--")]
     if "--pair" not in arguments:
-        return print(json.dumps([{"relmse": 0.02, "mean_ratio": 0.7 if "/peer/" in picture else 1} for picture in pictures[1:]]))
+        relmse = {picture: float(os.environ.get("FIRST_RELMSE", 0.02)) if picture.endswith("-0.exr") else 0.02 for picture in pictures}
+        return print(json.dumps([{"relmse": relmse[picture], "mean_ratio": 0.7 if "/peer/" in picture else 1} for picture in pictures[1:]]))
     seeds = sum(int(pathlib.Path(picture).stem.rpartition("-")[2]) for picture in pictures)
     value = 0.02 if "/a_path-" in pictures[0] else 0.0118 if "/a_method-" in pictures[0] else 0.01
     value *= 1 + float(os.environ.get("RANGE", "0")) * (seeds - 3)
