@@ -1,6 +1,7 @@
 """What the scripts that measure and show errors have in common."""
 
 import collections
+import hashlib
 import importlib.machinery
 import importlib.util
 import json
@@ -15,6 +16,16 @@ def load_evaluate():
     module = importlib.util.module_from_spec(importlib.util.spec_from_loader("evaluate", loader))
     loader.exec_module(module)
     return module
+
+
+def sha256(path):
+    return hashlib.sha256(pathlib.Path(path).read_bytes()).hexdigest()
+
+
+def is_biased(options):
+    """Whether pictures by these options of loberender differ from the expected picture by more than noise."""
+    text = " ".join(options).replace("=", " ")
+    return any(biased in text for biased in ("--integrator vcm", "--gradients l1", "--firefly-limit"))
 
 
 def read_summary(out):

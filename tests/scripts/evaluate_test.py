@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""Evaluates with tools that only pretend to render: plan.json has all that is needed to repeat the runs, an evaluation is continued by the
-same command only, wrong options are found first, and the tables and drawings of the results are complete.
+"""Evaluates and makes references with tools that only pretend to render: plan.json and references.json have all that is needed to repeat
+the runs, they are continued by the same command only, wrong options are found first, and the tables and drawings of the results are complete.
 
 Exits with 77 if Matplotlib is not installed.
 """
@@ -368,12 +368,38 @@ def check_reference(folder):
     assert all(abs(float(error) - 0.015) < 1e-9 for error in errors), errors
 
 
+def check_made_references(folder):
+    """The picture of a biased method is no reference, however low its variance, and the reference is not taken for that of other files."""
+    tools, scene, out = folder / "tools", folder / "room.xml", folder / "made"
+    scene.write_bytes((ROOT / "scenes/livingroom.xml").read_bytes())
+    command = [out, scene, "--spp", "1", "--runs", "4", "--methods", "path", "vcm", "--tools", tools]
+    assert "the reference is that of path" in run("make-references", *command)
+    table = (out / "references.json").read_text()
+    one = json.loads(table)[0]
+    assert one["hashes"] == {tool: sha256(tools / tool) for tool in ("loberender", "lobefit", "lobecompare")} | \
+        {"scene": sha256(scene), "caches": {"a.lobe": sha256(out / "room/caches/a.lobe")}}, one
+    assert one["version"] == "loberender 0.0.0" and one["threads"] is None and one["methods"]["vcm"]["scene_hash"] == "0a", one
+    assert one["machine"]["cores"] == len(os.sched_getaffinity(0)) and one["methods"]["vcm"]["options"] == ["--integrator", "vcm"], one
+    assert "with other caches" in run("make-references", *command, code=1, CACHE="second")
+    for file in (scene, tools / "loberender"):
+        content = file.read_bytes()
+        file.write_bytes(content + b"\n")
+        assert "by other tools, of another scene" in run("make-references", *command, code=1), file
+        file.write_bytes(content)
+    errors = run("make-references", *command, "--runs", "5", code=1, SCENE_HASH="0b")
+    assert "files of the scene have changed" in errors, errors
+    assert (out / "references.json").read_text() == table, "the table is not that of the reference"
+    errors = run("make-references", *command, "--methods", "vcm", "cut=--integrator path --firefly-limit 1", code=2)
+    assert "at least one method without a bias" in errors, errors
+
+
 def main():
     with tempfile.TemporaryDirectory(prefix="lobe-evaluate-") as name:
         folder = pathlib.Path(name)
         make_tools(folder / "tools")
         for check in (check_plan, check_refused, check_continued, check_interrupted, check_progress, check_pairs, check_usage, check_import,
-                      check_import_only, check_markdown, check_comparison, check_charts, check_long_run, check_missing_errors, check_reference):
+                      check_import_only, check_markdown, check_comparison, check_charts, check_long_run, check_missing_errors, check_reference,
+                      check_made_references):
             check(folder)
             print(check.__name__, "passed", flush=True)
     return 0

@@ -41,12 +41,18 @@ def lobefit(arguments):
 
 
 def lobecompare(arguments):
+    if "--merge" in arguments:
+        for option in ("--merge", "--variance"):
+            pathlib.Path(arguments[arguments.index(option) + 1]).write_text(option)
+        return
+    if "--agree-with" in arguments:
+        return print(json.dumps({"agree": True, "mean_ratio": 1, "mean_ratio_error": 0.1, "worst_z": 1, "limit_z": 4, "worst_at": [0, 0]}))
     pictures = [word for word in arguments if not word.startswith("--")]
     if "--pair" not in arguments:
         relmse = {picture: float(os.environ.get("FIRST_RELMSE", 0.02)) if picture.endswith("-0.exr") else 0.02 for picture in pictures}
         return print(json.dumps([{"relmse": relmse[picture], "mean_ratio": 0.7 if "/peer/" in picture else 1} for picture in pictures[1:]]))
     seeds = sum(int(pathlib.Path(picture).stem.rpartition("-")[2]) for picture in pictures)
-    value = 0.02 if "/a_path-" in pictures[0] else 0.0118 if "/a_method-" in pictures[0] else 0.01
+    value = 0.02 if "/a_path-" in pictures[0] or "/path/" in pictures[0] else 0.0118 if "/a_method-" in pictures[0] else 0.01
     value *= 1 + float(os.environ.get("RANGE", "0")) * (seeds - 3)
     print(json.dumps({"mean_ratio": 1} | {key: number for name in ("relvar", "relvar_drop_1pct", "relvar_drop_0.1pct")
                                           for key, number in ((name, value), (f"{name}_interval", [0.9 * value, 1.1 * value]))}))
