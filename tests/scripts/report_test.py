@@ -1,6 +1,7 @@
 #!/usr/bin/python3
-"""Opens a page of scripts/report in headless Chromium: the slider moves, the crop follows the keyboard, error maps appear, the page fits
-the width of a phone, and there is no script error. Also checks the tables in Markdown.
+"""Opens a page of scripts/report in headless Chromium: the edge follows the slider and the pointer, the crop a click and the keyboard, error
+maps appear, labels of charts are not cut off, the page fits the width of a phone, and there is no script error. Also checks the tables in
+Markdown.
 
 The argument is the folder of the tools. Exits with 77 if Chromium or Selenium is not installed.
 """
@@ -15,11 +16,13 @@ import tempfile
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 SKIPPED = 77
 PEER = "another-renderer-whose-name-is-wider-than-a-phone"
+DRAWING = """<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"><title>Roughness α</title><desc>One sentence.</desc></svg>"""
 
 try:
     from selenium import webdriver
     from selenium.webdriver.chrome.options import Options
     from selenium.webdriver.chrome.service import Service
+    from selenium.webdriver.common.action_chains import ActionChains
     from selenium.webdriver.common.by import By
     from selenium.webdriver.common.keys import Keys
     from selenium.webdriver.support.select import Select
@@ -29,11 +32,10 @@ except ImportError:
 
 
 def make_peer(tools, folder):
-    """The pictures of another renderer, which is Lobe itself."""
+    """The pictures of another renderer, which is Lobe itself, without PNG files."""
     for seed in (1, 2):
-        stem = folder / f"jewelry-{seed}"
         subprocess.run([tools / "loberender", ROOT / "scenes/jewelry.xml", "--integrator", "path", "--spp", "4", "--size", "240x150", "--seed", str(seed),
-                        "-o", f"{stem}.exr", "-o", f"{stem}.png"], check=True, stderr=subprocess.DEVNULL)
+                        "-o", folder / f"jewelry-{seed}.exr"], check=True, stderr=subprocess.DEVNULL)
     (folder / "times.csv").write_text("scene,seed,seconds\njewelry,1,1.5\njewelry,2,1.7\n")
 
 
@@ -55,7 +57,9 @@ def make_page(tools, folder):
     other = subprocess.run(evaluate, capture_output=True, text=True)
     assert other.returncode == 1 and "by another loberender" in other.stderr, f"pictures of other tools are mixed: {other.stderr}"
     record.write_text(of_these_tools)
-    subprocess.run([ROOT / "scripts/report", out, "--tools", tools, "--chart", ROOT / "docs/charts/slices.svg"], check=True)
+    (folder / "drawing.svg").write_text(DRAWING)
+    subprocess.run([ROOT / "scripts/report", out, "--tools", tools, "--chart", ROOT / "docs/charts/slices.svg", "--chart", folder / "drawing.svg"],
+                   check=True)
     return out / "report.html"
 
 
@@ -88,11 +92,13 @@ def open_page(page):
 
 def check_chart(driver, scene):
     assert len(scene.find_elements(By.CSS_SELECTOR, "circle > title")) == 4 + 4 + 1, "not a point for each budget, and the peer's"
-    text = scene.find_element(By.CSS_SELECTOR, "svg").text
+    text = scene.find_element(By.CSS_SELECTOR, ".chart").text
     assert text.count("slope") == text.count("±") == 2, f"slopes and their intervals are not shown: {text}"
     lines = [line.get_attribute("points").split() for line in scene.find_elements(By.CSS_SELECTOR, "polyline")]
     assert max(map(len, lines)) == 3, "a line joins budgets of seconds and of samples"
     assert driver.execute_script("return slope([[1, 1], [2, .6], [4, .2], [8, .15]])") == "-0.98 ± 0.65"
+    assert driver.execute_script("return slope([[2, 1], [2.001, .6]])") == "", "a slope without different times"
+    assert driver.execute_script("return ticks(...range([60, 60.1])).length") > 1, "too few ticks for one budget"
     styles = driver.execute_script("return [...Array(22).keys()].map(index => JSON.stringify(style(index)))")
     assert len(set(styles)) == 22, "methods look the same"
 
@@ -108,6 +114,62 @@ def check_best(driver):
     driver.execute_script("data.summary = data.summary.slice(3);")
     assert driver.execute_script("return overview().querySelector('tbody').textContent") == "s imported0.9 (0.9)", "no table of imported pictures"
     driver.refresh()
+
+
+def check_pointer(driver, scene):
+    """Dragging in the picture moves the edge only, a click the crop only."""
+    slider, right, window = (scene.find_element(By.CSS_SELECTOR, name) for name in (".slider", "img.right", ".window"))
+    bar = scene.find_element(By.CSS_SELECTOR, "input[type=range]")
+
+    def state():
+        return right.value_of_css_property("clip-path"), bar.get_attribute("value"), window.get_attribute("style")
+
+    before, quarter = state(), slider.size["width"] // 4
+    ActionChains(driver).move_to_element(slider).click_and_hold().move_by_offset(-quarter, 0).release().perform()
+    after = state()
+    assert after[:2] != before[:2] and 24 <= int(after[1]) <= 26 and after[2] == before[2], (before, after)
+    ActionChains(driver).move_to_element_with_offset(slider, quarter, 0).click().perform()
+    assert state()[:2] == after[:2] and state()[2] != after[2], (after, state())
+
+
+def check_runs(scene):
+    """Times of a segment are there for all runs of ours, and relative to path of the same build."""
+    header, *rows = ([cell.text for cell in row.find_elements(By.CSS_SELECTOR, "th, td")] for row in scene.find_elements(By.CSS_SELECTOR, ".scroll tr"))
+    time, relative = header.index("time per segment, ns"), header.index("time per segment, relative to path")
+    for row in rows:
+        assert bool(row[time]) == bool(row[relative]) == (row[0] != PEER), row
+        assert row[0] != "a:path" or row[relative] == "1", row
+    assert len(rows) == 9, rows
+
+
+def check_charts(driver):
+    headings = [heading.text for heading in driver.find_elements(By.CSS_SELECTOR, "#charts h3")]
+    assert headings == ["slices.svg", "Roughness α"], headings
+    assert [one.text for one in driver.find_elements(By.CSS_SELECTOR, "#charts p")] == ["One sentence."]
+    for drawing in driver.find_elements(By.CSS_SELECTOR, "#charts img"):
+        assert driver.execute_script("return arguments[0].naturalWidth", drawing) > 0, "a chart is not shown"
+
+
+def check_phone(driver):
+    # Windows of Chromium cannot be that narrow.
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {"width": 360, "height": 800, "deviceScaleFactor": 1, "mobile": True})
+    width = driver.execute_script("return document.documentElement.scrollWidth")
+    assert width <= 360, f"too wide for a phone: {width} pixels"
+    sizes, cut = driver.execute_script("""
+      const texts = [...document.querySelectorAll("svg.plot text")];
+      return [texts.map(text => parseFloat(getComputedStyle(text).fontSize) * Math.hypot(text.getScreenCTM().a, text.getScreenCTM().b)),
+              texts.filter(text => {
+                const [inner, outer] = [text.getBoundingClientRect(), text.ownerSVGElement.getBoundingClientRect()];
+                return inner.left < outer.left || inner.right > outer.right || inner.top < outer.top || inner.bottom > outer.bottom;
+              }).map(text => text.textContent)]""")
+    assert min(sizes) >= 10 and not cut, (min(sizes), cut)
+    drawn, natural = driver.execute_script("const image = document.querySelector('#charts img'); return [image.width, image.naturalWidth]")
+    assert drawn >= 0.9 * natural, "drawings are too small to read"
+    left, scrolled = driver.execute_script("""
+      const place = document.getElementById("caches"), cell = place.querySelector("td");
+      place.scrollLeft = 1000;
+      return [cell.getBoundingClientRect().left - place.getBoundingClientRect().left, place.scrollLeft]""")
+    assert scrolled > 100 and abs(left) < 1, "the first column is not visible beside the others"
 
 
 def check(driver, tools):
@@ -129,7 +191,10 @@ def check(driver, tools):
     scene.find_element(By.CSS_SELECTOR, "input[type=checkbox]").send_keys(Keys.SPACE)
     assert right.get_attribute("src") != picture, "there is no error map"
     assert scene.find_element(By.CSS_SELECTOR, ".legend").is_displayed(), "error maps have no scale"
-    assert len(scene.find_elements(By.CSS_SELECTOR, ".crops figure")) == 3
+    captions = [caption.text for caption in scene.find_elements(By.CSS_SELECTOR, ".crops figcaption")]
+    assert len(captions) == 3 and all("\nvariance 0." in caption for caption in captions), captions
+    check_pointer(driver, scene)
+    check_runs(scene)
     assert "Pictures: a:path seconds 1," in scene.text, "pictures are not those of the longest time"
     check_chart(driver, scene)
     digest = hashlib.sha256((tools / "loberender").read_bytes()).hexdigest()
@@ -143,17 +208,16 @@ def check(driver, tools):
     Select(scene.find_element(By.CSS_SELECTOR, "div:has(> .chart) select")).select_by_index(2)
     assert scene.find_element(By.CSS_SELECTOR, ".chart svg").get_attribute("outerHTML") != before, "the chart does not show the other error"
     rows = driver.find_elements(By.CSS_SELECTOR, "#caches tbody tr")
-    charts = driver.find_elements(By.CSS_SELECTOR, "#fit-charts svg")
+    charts = driver.find_elements(By.CSS_SELECTOR, "#fit-charts svg.plot")
     assert len(charts) == 2, "there are no charts of the fits"
     for fits in charts:
         assert len(fits.find_elements(By.CSS_SELECTOR, "circle > title")) == len(rows) > 3, "the charts do not show every cache"
-    assert driver.find_element(By.CSS_SELECTOR, "#charts h3").text == "slices.svg"
-    drawing = driver.find_element(By.CSS_SELECTOR, "#charts img")
-    assert driver.execute_script("return arguments[0].naturalWidth", drawing) > 0, "the chart is not shown"
-    # Windows of Chromium cannot be that narrow.
-    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {"width": 360, "height": 800, "deviceScaleFactor": 1, "mobile": True})
-    width = driver.execute_script("return document.documentElement.scrollWidth")
-    assert width <= 360, f"too wide for a phone: {width} pixels"
+    assert driver.execute_script("data.plan.methods.v = ['--integrator', 'vcm']; return named('v') + named('a:path')") == "v (biased)a:path"
+    command = driver.find_element(By.ID, "command").text
+    assert "'depth-2.0=--integrator path --max-depth 2'" in command and "\n" not in command, command
+    assert not driver.find_element(By.ID, "plan").is_displayed(), "the plan is not folded"
+    check_charts(driver)
+    check_phone(driver)
     errors = driver.get_log("browser")
     assert not errors, errors
 
