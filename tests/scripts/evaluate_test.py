@@ -11,6 +11,7 @@ import json
 import os
 import pathlib
 import pty
+import runpy
 import signal
 import struct
 import subprocess
@@ -299,11 +300,39 @@ def check_comparison(folder):
     difference = numpy.abs(drawn[:90, left:left + 160] - original)
     difference[30:60, 60:100] = 0  # the frame of the crop
     assert difference.max() < 0.01, "the picture is resampled"
-    crops = 90 + 8 + 90
+    # The pictures have 64×40 pixels, the crops 13×8, enlarged 11 times.
+    crops = 90 + 8 + 88
     assert drawn.shape[0] > crops + 30, drawn.shape
     captions = drawn[crops:]
     assert captions[:, 160:].min() < 0.5, "there are no captions"
+    first = drawn[98:186, :160]
+    inside = first[:, 80 - 72:80 - 72 + 143]
+    assert inside.max() < 0.6 and numpy.delete(first, range(8, 151), axis=1).min() == 1, "crops are not enlarged by a whole number"
     assert min(edge.min() for edge in (captions[:, :3], captions[:, -3:], captions[-3:])) == 1, "captions are cut off"
+
+
+def check_comparison_usage(folder):
+    picture, out = folder / "picture.png", folder / "none.png"
+
+    def draw(*arguments, code):
+        return run("draw-comparison", folder / "out", SCENE, *arguments, "--methods", "a:path", "-o", out, code=code)
+
+    for crop in ((".9", ".9", ".5", ".5"), ("-0.1", "0", "1", "1"), ("0", "0", "0", "1")):
+        assert "--crop is not inside the picture" in draw(picture, "--crop", *crop, code=2), crop
+    missing = draw(folder / "missing.png", "--crop", "0", "0", "1", "1", code=1)
+    assert missing.endswith("missing.png: not found\n") and missing.count("\n") == 1, missing
+    first = folder / f"out/runs/{SCENE}/a_path-s8-1.png"
+    first.rename(folder / "away.png")
+    assert "a_path-s8-1.png: not found" in draw(picture, "--crop", "0", "0", "1", "1", code=1)
+    (folder / "away.png").rename(first)
+    assert not out.exists()
+    # The crop may be the whole picture. Captions have two digits.
+    run("draw-comparison", folder / "out", SCENE, picture, "--crop", "0", "0", "1", "1", "--methods", "a:path", f"a:{LONG}", "-o", out)
+    sys.path.insert(0, str(ROOT / "scripts"))
+    script = runpy.run_path(str(ROOT / "scripts/draw-comparison"))
+    assert [script["caption"]("path", {"trimmed": value, "budget": "seconds 8"})[1] for value in (0.0603, 0.061, 1.0, 12)] == \
+        ["variance 0.060", "variance 0.061", "variance 1.0", "variance 12"]
+    assert script["enlarged"](numpy.arange(40).reshape(4, 10), 5).tolist() == [[11, 13, 15, 17, 19], [31, 33, 35, 37, 39]]
 
 
 def check_charts(folder):
@@ -398,8 +427,8 @@ def main():
         folder = pathlib.Path(name)
         make_tools(folder / "tools")
         for check in (check_plan, check_refused, check_continued, check_interrupted, check_progress, check_pairs, check_usage, check_import,
-                      check_import_only, check_markdown, check_comparison, check_charts, check_long_run, check_missing_errors, check_reference,
-                      check_made_references):
+                      check_import_only, check_markdown, check_comparison, check_comparison_usage, check_charts, check_long_run,
+                      check_missing_errors, check_reference, check_made_references):
             check(folder)
             print(check.__name__, "passed", flush=True)
     return 0
