@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -214,10 +215,26 @@ void printTable(const lobe::PairVariance& v, const Arguments& arguments) {
   table.print(stdout);
 }
 
+/// Such pairs are compared, too, because integrators without a bias have the same expected picture.
+void noteDifferences(const std::string& a, const std::string& b) {
+  const lobe::ImageAttributes ofA = lobe::readAttributes(a), ofB = lobe::readAttributes(b);
+  const std::pair<const char*, const char*> compared[] = {{"sceneHash", "scenes or cameras"},
+                                                          {"integrator", "integrators"}};
+  for (const auto& [key, text] : compared) {
+    const auto one = ofA.find(key), other = ofB.find(key);
+    if (one != ofA.end() && other != ofB.end() && one->second != other->second)
+      lobe::printNote("lobecompare",
+                      fmt::format("{} and {}: are pictures of different {}; their difference is noise alone only if "
+                                  "both have the same expected value",
+                                  a, b, text));
+  }
+}
+
 void comparePair(const Arguments& arguments) {
   const std::string& name = arguments.images[0];
   const lobe::Image a = lobe::readImage(arguments.reference), b = lobe::readImage(name);
   lobe::checkDifferentSeeds(arguments.reference, name);
+  noteDifferences(arguments.reference, name);
   const lobe::PairVariance variance = measured(name, [&] { return lobe::comparePair(a, b); });
   arguments.json ? printJson(variance, arguments) : printTable(variance, arguments);
   if (!arguments.map.empty()) lobe::writeErrorMap(arguments.map, a.width, lobe::relativeVariances(a, b));

@@ -87,6 +87,36 @@ TEST_CASE("render: lobecompare prints error metrics as text and JSON") {
   }
 }
 
+TEST_CASE("render: lobecompare --pair notes different scenes and integrators, and compares them") {
+  const Folder folder;
+  const auto write = [&](const char* name, const char* scene, const char* integrator) {
+    const std::string path = folder / name;
+    writeImage(path, Image(4, 4, grey(0.5f)), {{"sceneHash", scene}, {"integrator", integrator}});
+    return path;
+  };
+  const std::string a = write("a.exr", "0a", "path"), same = write("same.exr", "0a", "path"),
+                    other = write("other.exr", "0b", "product");
+  CHECK(lobecompare("--pair " + a + " " + same).error.empty());
+  const ToolRun run = lobecompare("--pair " + a + " " + other);
+  CHECK(run.code == 0);
+  CHECK(run.out.find("relative variance") != std::string::npos);
+  CHECK(lineCount(run.error) == 2);
+  CHECK_THAT(run.error, Catch::Contains("lobecompare: note: " + a + " and " + other) &&
+                            Catch::Contains("different scenes or cameras;") &&
+                            Catch::Contains("different integrators;"));
+}
+
+TEST_CASE("render: lobecompare --pair compares PNG files by their linear values") {
+  const Folder folder;
+  const std::string a = folder / "a.png", b = folder / "b.png";
+  writeImage(a, Image(4, 4, grey(0.2f)));
+  writeImage(b, Image(4, 4, grey(0.6f)));
+  const ToolRun run = lobecompare("--pair --json " + a + " " + b);
+  REQUIRE(run.code == 0);
+  CHECK(run.error.empty());
+  CHECK(parseJson(run.out)["relvar"].get<double>() == Approx(0.5 * 0.4 * 0.4 / (0.4 * 0.4 + 0.01)).epsilon(0.03));
+}
+
 TEST_CASE("render: lobecompare --png writes the picture as loberender does") {
   const Folder folder;
   const std::string input = folder / "a.exr", output = folder / "a.png", direct = folder / "b.png";
