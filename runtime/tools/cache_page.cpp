@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "runtime/analysis/colour_map.h"
+#include "runtime/core/parallel.h"
 #include "runtime/tools/cache_grid.h"
 #include "runtime/tools/cache_plot.h"
 #include "runtime/tools/cache_report.h"
@@ -85,7 +86,8 @@ std::uint16_t packedRatio(double ratio) {
   return static_cast<std::uint16_t>(std::lround(65535 * (std::log10(std::clamp(ratio, 0.01, 100.0)) + 2) / 4));
 }
 
-/// The targets and ratios of all records of a cache, in grids of cells × cells; zero outside the disc.
+/// The targets and ratios of all records of a cache, in grids of cells × cells; zero outside the disc. Different
+/// records may be added at the same time.
 class TargetGrids {
  public:
   explicit TargetGrids(std::size_t records)
@@ -170,7 +172,17 @@ Json factsOf(const PagedCache& paged) {
   return facts;
 }
 
-Json cacheJson(const PagedCache& paged) {
+/// With a lobe, a record takes milliseconds, most of them for its grade and for the part of the disc that it covers.
+Json recordsJson(const PagedCache& paged, TargetGrids& grids, const std::function<void()>& advance) {
+  std::vector<Json> records(paged.cache->records().size());
+  parallelFor(std::size_t{0}, records.size(), [&](std::size_t i) {
+    records[i] = recordJson(paged, i, grids);
+    advance();
+  });
+  return records;
+}
+
+Json cacheJson(const PagedCache& paged, const std::function<void()>& advance) {
   const LobeCache& cache = *paged.cache;
   const DirectionGrid grid = gridOf(cache);
   std::vector<float> directions;
@@ -188,10 +200,9 @@ Json cacheJson(const PagedCache& paged) {
             {"directions", base64(directions)},
             {"lookup", base64(lookup)},
             {"components", base64(std::as_bytes(cache.components()))},
-            {"cells", 0},
-            {"records", Json::array()}};
+            {"cells", 0}};
   TargetGrids grids(cache.records().size());
-  for (std::size_t i = 0; i < cache.records().size(); ++i) json["records"].push_back(recordJson(paged, i, grids));
+  json["records"] = recordsJson(paged, grids, advance);
   if (paged.lobe) json.update(grids.json());
   return json;
 }
@@ -230,9 +241,9 @@ Json illuminationJson(const IlluminationFile& file, const std::string& path) {
 
 }  // namespace
 
-std::string lobePage(std::span<const PagedCache> caches) {
+std::string lobePage(std::span<const PagedCache> caches, const std::function<void()>& advance) {
   Json files = Json::array();
-  for (const PagedCache& paged : caches) files.push_back(cacheJson(paged));
+  for (const PagedCache& paged : caches) files.push_back(cacheJson(paged, advance));
   return page("lobe", files);
 }
 

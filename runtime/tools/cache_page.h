@@ -2,6 +2,7 @@
 // An interactive HTML page of BRDF caches or of trained illumination. It needs no other file and no network.
 
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -21,8 +22,9 @@ struct PagedCache {
 
 /// The page shows the record that serves a chosen outgoing direction: target, fit and their ratio over the disc of
 /// incident directions, the components, and the grades. Targets are stored for every record as a grid of cells, which
-/// is coarser for caches of many records, so that the page has at most about 8 MB for each cache.
-std::string lobePage(std::span<const PagedCache> caches);
+/// is coarser for caches of many records, so that the page has at most about 8 MB for each cache. Records
+/// are evaluated in parallel; advance is called after each of them, from any thread.
+std::string lobePage(std::span<const PagedCache> caches, const std::function<void()>& advance);
 
 /// The page shows a map of the records in the scene, and the mixture of the selected one. paths: of the files.
 std::string illuminationPage(std::span<const IlluminationFile> files, std::span<const std::string> paths);

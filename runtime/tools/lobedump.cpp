@@ -224,12 +224,15 @@ void runPage(const std::vector<LobeCache>& caches, Options& o) {
   const std::vector<LobeUse> uses = lobesOfScene(o, o.html);
   std::vector<LobePtr> lobes;
   std::vector<PagedCache> paged;
+  std::size_t records = 0;
   for (std::size_t i = 0; i < caches.size(); ++i) {
     lobes.push_back(lobeOf(caches[i], uses, o.files[i]));
     if (!lobes.back() && !o.scene.empty()) throw std::runtime_error(noLobe(caches[i], o.files[i], o));
     paged.push_back({&caches[i], o.files[i], lobes.back().get()});
+    records += caches[i].records().size();
   }
-  writeAtomically(o.html, lobePage(paged));
+  Progress progress("evaluating", static_cast<double>(records));
+  writeAtomically(o.html, lobePage(paged, [&progress] { progress.advance(); }));
 }
 
 // ---- Illumination

@@ -1,6 +1,7 @@
 // Grades, plots and differences shown by lobedump.
 
 #include <algorithm>
+#include <atomic>
 #include <catch2/catch.hpp>
 #include <cmath>
 
@@ -12,6 +13,7 @@
 #include "runtime/image/image.h"
 #include "runtime/mixture/grid.h"
 #include "runtime/tools/cache_diff.h"
+#include "runtime/tools/cache_page.h"
 #include "runtime/tools/cache_plot.h"
 #include "tests/support/fitter_test_lobes.h"
 #include "tests/support/json.h"
@@ -267,6 +269,15 @@ TEST_CASE("fitter: lobedump --html writes a page that needs nothing else") {
   // Without a scene there are no targets.
   CHECK(folder.run("lobedump --html fits.html good.lobe other.lobe").code == 0);
   CHECK(readFile(folder / "fits.html").size() < page.size() / 2);
+}
+
+TEST_CASE("fitter: the page of caches reports its progress after each record") {
+  const Caches folder;
+  const LobeCache good = LobeCache::open(folder / "good.lobe"), more = LobeCache::open(folder / "more.lobe");
+  const std::vector<PagedCache> paged{{&good, "good.lobe", nullptr}, {&more, "more.lobe", nullptr}};
+  std::atomic<std::size_t> done = 0;
+  lobePage(paged, [&] { ++done; });
+  CHECK(done == good.records().size() + more.records().size());
 }
 
 TEST_CASE("fitter: lobedump --html reports invalid arguments") {
