@@ -97,8 +97,7 @@ class TargetGrids {
         ratio_(target_.size()) {}
 
   /// Returns the peak of the target.
-  double add(std::size_t index, const PlottedRecord& record) {
-    const PlotView view = record.view();
+  double add(std::size_t index, const PlottedRecord& record, const PlotView& view) {
     const auto count = static_cast<std::size_t>(cells_) * cells_;
     std::vector<double> values(count);
     for (std::size_t i = 0; i < count; ++i) {
@@ -149,7 +148,7 @@ Json recordJson(const PagedCache& paged, std::size_t index, TargetGrids& grids) 
   const PlotView view = plotted.view();
   json["view"] = {shortNumber(view.centre.x()), shortNumber(view.centre.y()), shortNumber(view.half)};
   if (!paged.lobe) return json;
-  json["target_peak"] = grids.add(index, plotted);
+  json["target_peak"] = grids.add(index, plotted, view);
   const std::optional<Quality> grade = plotted.grade();
   json["worst_at"] = grade->worst > 0 ? pointJson(toDisc(grade->worstAt)) : Json();
   return json;
@@ -172,7 +171,7 @@ Json factsOf(const PagedCache& paged) {
   return facts;
 }
 
-/// With a lobe, a record takes milliseconds, most of them for its grade and for the part of the disc that it covers.
+/// With a lobe, a record takes milliseconds.
 Json recordsJson(const PagedCache& paged, TargetGrids& grids, const std::function<void()>& advance) {
   std::vector<Json> records(paged.cache->records().size());
   parallelFor(std::size_t{0}, records.size(), [&](std::size_t i) {

@@ -90,10 +90,11 @@ std::optional<Quality> PlottedRecord::grade() const {
 }
 
 PlotView PlottedRecord::view() const {
-  Box box = boxOfFit(mixture_);
-  if (hasTarget()) box.extend(boxOfTarget(*this));
-  box = box.intersection(Box(Vec2(-1, -1), Vec2(1, 1)));
-  if (box.isEmpty() || box.sizes().maxCoeff() * kMargin > 2 * kCloseView) return {{0, 0}, kWholeDisc};
+  Box box = boxOfFit(mixture_).intersection(Box(Vec2(-1, -1), Vec2(1, 1)));
+  const auto large = [&box] { return box.sizes().maxCoeff() * kMargin > 2 * kCloseView; };
+  // The target takes long to evaluate, and can only enlarge the box.
+  if (hasTarget() && !large()) box.extend(boxOfTarget(*this));
+  if (box.isEmpty() || large()) return {{0, 0}, kWholeDisc};
   return {box.center(), 0.5f * kMargin * box.sizes().maxCoeff()};
 }
 
