@@ -23,23 +23,12 @@ namespace {
   throw std::runtime_error(fmt::format("{}: cannot write: {}", path.string(), std::strerror(error)));
 }
 
-/// The end of a chain of symbolic links, which need not exist.
-fs::path followLinks(fs::path path) {
-  constexpr int kMostLinks = 40;  // the limit of Linux
-  std::error_code error;
-  for (int i = 0; i < kMostLinks; ++i) {
-    const fs::path next = fs::read_symlink(path, error);
-    if (error) return path;
-    path = path.parent_path() / next;  // an absolute target replaces the folder
-  }
-  refuse(path, ELOOP);
-}
-
 /// The file to replace: symbolic links are followed, including those to files that do not exist yet. Throws unless it
 /// is a regular file or absent, so that `-o /dev/null` does not replace the device.
 fs::path targetOf(const fs::path& path) {
   std::error_code error;
   fs::path target = followLinks(path);
+  if (fs::is_symlink(fs::symlink_status(target, error))) refuse(path, ELOOP);
   const fs::file_status status = fs::status(target, error);
   if (error == std::errc::filename_too_long) refuse(path, ENAMETOOLONG);
   if (fs::is_directory(status)) throw std::runtime_error(path.string() + ": cannot write: is a directory");
@@ -143,6 +132,17 @@ class Temporary {
 };
 
 }  // namespace
+
+fs::path followLinks(fs::path path) {
+  constexpr int kMostLinks = 40;  // the limit of Linux
+  std::error_code error;
+  for (int i = 0; i < kMostLinks; ++i) {
+    const fs::path next = fs::read_symlink(path, error);
+    if (error) break;
+    path = path.parent_path() / next;  // an absolute target replaces the folder
+  }
+  return path;
+}
 
 void writeAtomically(const fs::path& path, std::span<const std::byte> bytes) {
   Temporary temporary(targetOf(path), path);

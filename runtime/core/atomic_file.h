@@ -17,6 +17,10 @@ void writeAtomically(const std::filesystem::path& path, const std::string& text)
 /// whose result is written to `path`.
 void checkWritable(const std::filesystem::path& path);
 
+/// The file that writeAtomically writes for `path`: the end of a chain of symbolic links, which need not exist. A link
+/// if there are more than the system follows, and writeAtomically fails.
+std::filesystem::path followLinks(std::filesystem::path path);
+
 /// Makes the signal end the program as it does by default, but not before writeAtomically has given up or completed the
 /// files that are being written, so that no temporary file remains. Also for signal handlers.
 void endAfterWriting(int signal);

@@ -104,14 +104,8 @@ std::vector<std::filesystem::path> all(const Arguments& arguments) {
 void checkMerge(const Arguments& arguments) {
   if (std::filesystem::path(arguments.merge).extension() != ".exr")
     throw lobe::UsageError("--merge must name an .exr file, because it stores the number of samples");
-  if (arguments.variance.empty()) return;
-  if (std::filesystem::path(arguments.variance).extension() != ".exr")
+  if (!arguments.variance.empty() && std::filesystem::path(arguments.variance).extension() != ".exr")
     throw lobe::UsageError("--variance must name an .exr file");
-  const auto canonical = [](const std::string& name) {
-    return std::filesystem::weakly_canonical(std::filesystem::absolute(name));
-  };
-  if (canonical(arguments.variance) == canonical(arguments.merge))
-    throw lobe::UsageError("--merge and --variance must name different files");
 }
 
 void checkPng(const Arguments& arguments) {
@@ -119,15 +113,14 @@ void checkPng(const Arguments& arguments) {
   const std::filesystem::path output = arguments.images.front();
   if (output.extension() != ".png")
     throw lobe::UsageError(fmt::format("{}: --png writes its second file, which must be a .png file", output.string()));
-  lobe::checkNotRead(output, {arguments.reference});
+  lobe::checkOutputs({output}, {arguments.reference});
 }
 
 void checkArguments(const Arguments& arguments) {
   if (arguments.png) return checkPng(arguments);
   if (!arguments.merge.empty()) checkMerge(arguments);
   if (arguments.pair && arguments.images.size() != 1) throw lobe::UsageError("--pair takes two images");
-  for (const std::filesystem::path output : {arguments.merge, arguments.variance, arguments.map})
-    if (!output.empty()) lobe::checkNotRead(output, all(arguments));
+  lobe::checkOutputs({arguments.merge, arguments.variance, arguments.map}, all(arguments));
   if (arguments.map.empty()) return;
   if (arguments.images.size() > 1) throw lobe::UsageError("--map takes one image, but several are given");
   if (std::filesystem::path(arguments.map).extension() != ".png") throw lobe::UsageError("--map must name a .png file");

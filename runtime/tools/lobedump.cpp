@@ -102,8 +102,7 @@ void validate(const Options& o) {
   if (!o.read.definitions.empty() && o.scene.empty()) throw UsageError("-D needs --scene");
   std::vector<std::filesystem::path> inputs(o.files.begin(), o.files.end());
   inputs.emplace_back(o.scene);
-  for (const std::string& output : {o.points, o.plot, o.html})
-    if (!output.empty()) checkNotRead(output, inputs);
+  checkOutputs({o.points, o.plot, o.html}, inputs);
   if (!o.html.empty() && std::filesystem::path(o.html).extension() != ".html")
     throw UsageError(fmt::format("--html {}: must be an .html file", o.html));
   if (o.plot.empty()) return;
@@ -152,7 +151,7 @@ std::vector<LobeUse> lobesOfScene(Options& o, const std::string& output) {
   // Parts of the scene that the reader does not support cannot contain the lobe.
   o.read.lenient = true;
   const Scene scene = readScene(o.scene, o.read);
-  checkNotRead(output, scene.files);
+  checkOutputs({output}, scene.files);
   return collectLobes(scene);
 }
 

@@ -4,9 +4,11 @@
 #include <atomic>
 #include <chrono>
 #include <exception>
-#include <iterator>
-#include <new>
+#include <filesystem>
 #include <optional>
+#include <string>
+#include <variant>
+#include <vector>
 
 #include <fmt/format.h>
 #include <tbb/global_control.h>
@@ -14,7 +16,6 @@
 #include <nlohmann/json.hpp>
 
 #include "fitter/compile.h"
-#include "runtime/core/files.h"
 #include "runtime/core/parallel.h"
 #include "runtime/core/stop.h"
 #include "runtime/tools/cache_report.h"
@@ -116,59 +117,66 @@ CacheReport compileOne(const CompileJob& job, Progress& progress) {
   return {job.path, job.info.summary, job.use.materials, summarise(cache), job.upToDate, seconds};
 }
 
-/// Reports the lobes that could not be fitted in one line; the caches of the others have been written.
-[[noreturn]] void failWith(const std::vector<std::string>& faults, std::size_t jobs) {
-  const std::size_t failed = faults.size();
-  std::string line = faults.front();
-  if (failed > 1) line += fmt::format(" (and {} more lobes failed)", failed - 1);
-  if (failed < jobs) line += fmt::format("; the other {} lobes are written", jobs - failed);
-  throw std::runtime_error(line);
+/// Throws UsageError if a cache would replace a file that is read: of the scene, or another cache.
+void checkCaches(const std::vector<CompileJob>& jobs, const Scene& scene, const Options& o) {
+  std::vector<std::filesystem::path> written, read = scene.files;
+  read.emplace_back(o.scene);
+  read.push_back(o.read.camera);
+  for (const CompileJob& job : jobs) (job.upToDate ? read : written).push_back(job.path);
+  checkOutputs(written, read);
 }
 
-/// Returns whether the job's cache is complete. A failure is stored in fault.
-bool attempt(const CompileJob& job, Progress& progress, CacheReport& report, std::string& fault) {
-  try {
-    report = compileOne(job, progress);
-    return true;
-  } catch (const OutOfMemory& error) {
-    fault = error.what();
-    return false;
-  } catch (const std::bad_alloc&) {
-    fault = job.path.string() + ": not enough memory";
-    return false;
-  } catch (const std::exception& error) {
-    fault = error.what();
-    return false;
-  }
-}
-
-std::vector<CacheReport> compileAll(const std::vector<CompileJob>& jobs, const StopFlag& stop) {
+double workOfAll(const std::vector<CompileJob>& jobs) {
   double directions = 0;
-  for (const CompileJob& job : jobs) {
+  for (const CompileJob& job : jobs)
     if (!job.upToDate) directions += workOf(job);
+  return directions;
+}
+
+void printStale(const std::vector<CompileJob>& jobs) {
+  for (const CompileJob& job : jobs)
     if (!job.stale.empty())
       printDiagnostic(
           fmt::format("lobefit: {} is fitted again: {}\n", job.path.string(), withoutPath(job.stale, job.path)));
-  }
-  Progress progress("fitting", directions);
-  std::vector<CacheReport> reports(jobs.size());
-  std::vector<std::string> faultOf(jobs.size());
+}
+
+/// A cache, or why there is none.
+using Outcome = std::variant<CacheReport, std::exception_ptr>;
+
+std::vector<Outcome> compileAll(const std::vector<CompileJob>& jobs, const StopFlag& stop) {
+  Progress progress("fitting", workOfAll(jobs));
+  std::vector<Outcome> outcomes(jobs.size());
   // Lobes are fitted in parallel as well, because the first few directions of each lobe leave cores idle. An exception
-  // would cancel the other lobes, so the message of each is stored.
+  // would cancel the other lobes, so that of each is stored.
   std::atomic<std::size_t> complete = static_cast<std::size_t>(std::ranges::count_if(jobs, &CompileJob::upToDate));
   try {
     stoppable(stop, "", [&] {
       parallelFor(std::size_t{0}, jobs.size(), [&](std::size_t i) {
-        if (attempt(jobs[i], progress, reports[i], faultOf[i]) && !jobs[i].upToDate) ++complete;
+        try {
+          outcomes[i] = compileOne(jobs[i], progress);
+          if (!jobs[i].upToDate) ++complete;
+        } catch (...) {
+          outcomes[i] = std::current_exception();
+        }
       });
     });
   } catch (const Stopped&) {
     throw Stopped(
         fmt::format("{} of {} caches are complete; the same command fits the others", complete.load(), jobs.size()));
   }
-  std::vector<std::string> faults;
-  std::ranges::copy_if(faultOf, std::back_inserter(faults), [](const std::string& fault) { return !fault.empty(); });
-  if (!faults.empty()) failWith(faults, jobs.size());
+  return outcomes;
+}
+
+/// The caches that are complete. The errors of the others are added to the errors.
+std::vector<CacheReport> completeOnes(const std::vector<CompileJob>& jobs, const std::vector<Outcome>& outcomes,
+                                      OutputErrors& errors) {
+  std::vector<CacheReport> reports;
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    if (const auto* failure = std::get_if<std::exception_ptr>(&outcomes[i]))
+      errors.attempt(jobs[i].path, [&] { std::rethrow_exception(*failure); });
+    else
+      reports.push_back(std::get<CacheReport>(outcomes[i]));
+  }
   return reports;
 }
 
@@ -182,14 +190,15 @@ void printResult(const std::vector<CacheReport>& reports, const Options& o) {
   if (!reports.empty()) printReports(reports, true, stdout);
 }
 
-void reportSummary(const std::vector<CacheReport>& reports, const Options& o) {
+/// lobes: the number of all, also of those whose caches could not be written.
+void reportSummary(const std::vector<CacheReport>& reports, std::size_t lobes, const Options& o) {
   const auto fresh = std::ranges::count_if(reports, [](const CacheReport& r) { return !r.upToDate; });
-  std::string line = fmt::format("{} of {} lobes written to {}", fresh, reports.size(), o.compile.directory.string());
-  if (reports.empty())
+  const std::string folder = o.compile.directory.string();
+  std::string line = fmt::format("{} of {} lobes written to {}", fresh, lobes, folder);
+  if (lobes == 0)
     line = fmt::format("nothing to do: no material of {} has a glossy lobe to fit", o.scene);
-  else if (fresh == 0)
-    line =
-        fmt::format("nothing to do: all {} lobes in {} are up to date", reports.size(), o.compile.directory.string());
+  else if (fresh == 0 && reports.size() == lobes)
+    line = fmt::format("nothing to do: all {} lobes in {} are up to date", lobes, folder);
   printDiagnostic(fmt::format("lobefit: {}\n", line));
 }
 
@@ -218,10 +227,15 @@ void run(Options& o) {
   stoppable(stop, "while the scene was read, so no cache is written", [&] { scene = readScene(o.scene, o.read); });
   for (const std::string& note : scene.notes) printNote("lobefit", note);
   for (const std::string& warning : scene.warnings) printWarning("lobefit", warning);
-  const std::vector<CacheReport> reports = compileAll(planCompile(collectLobes(scene), o.compile), stop);
-  reportSummary(reports, o);
+  const std::vector<CompileJob> jobs = planCompile(collectLobes(scene), o.compile);
+  checkCaches(jobs, scene, o);
+  printStale(jobs);
+  OutputErrors errors;
+  const std::vector<CacheReport> reports = completeOnes(jobs, compileAll(jobs, stop), errors);
+  reportSummary(reports, jobs.size(), o);
   reportMissedQuality(reports, o);
   printResult(reports, o);
+  errors.throwIfAny();
 }
 
 }  // namespace

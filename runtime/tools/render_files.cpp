@@ -1,9 +1,6 @@
 #include "runtime/tools/render_files.h"
 
-#include <map>
 #include <vector>
-
-#include <fmt/format.h>
 
 #include "runtime/core/atomic_file.h"
 #include "runtime/guiding/brdf_caches.h"
@@ -11,11 +8,6 @@
 
 namespace lobe {
 namespace {
-
-/// The canonical absolute path, for comparing paths.
-std::filesystem::path placeOf(const std::filesystem::path& path) {
-  return std::filesystem::weakly_canonical(std::filesystem::absolute(path));
-}
 
 std::vector<std::filesystem::path> writtenBy(const RenderJob& job) {
   std::vector<std::filesystem::path> written = job.outputs;
@@ -25,19 +17,22 @@ std::vector<std::filesystem::path> writtenBy(const RenderJob& job) {
   return written;
 }
 
+/// The files that the options name.
+std::vector<std::filesystem::path> readBy(const RenderJob& job) {
+  std::vector<std::filesystem::path> read{job.scene, job.camera, job.reference, job.illumination};
+  if (!job.resume.empty() && (job.checkpoint.empty() || !isSameFile(job.resume, job.checkpoint)))
+    read.push_back(job.resume);
+  return read;
+}
+
 }  // namespace
 
 void checkFiles(const RenderJob& job) {
   const std::vector<std::filesystem::path> written = writtenBy(job);
-  std::map<std::filesystem::path, int> uses;
-  for (const auto& path : {job.scene, job.camera, job.reference, job.illumination})
-    if (!path.empty()) ++uses[placeOf(path)];
-  if (!job.resume.empty() && (job.checkpoint.empty() || placeOf(job.resume) != placeOf(job.checkpoint)))
-    ++uses[placeOf(job.resume)];
-  for (const auto& path : written)
-    if (++uses[placeOf(path)] > 1)
-      throw UsageError(fmt::format("{}: is used for more than one file, and would be overwritten", path.string()));
-  for (const auto& path : written) checkWritable(path);
+  checkOutputs(written, readBy(job));
+  OutputErrors errors;
+  for (const auto& path : written) errors.attempt(path, [&] { checkWritable(path); });
+  errors.throwIfAny();
 }
 
 void checkSceneFiles(const RenderJob& job, const Scene& scene) {
@@ -45,7 +40,7 @@ void checkSceneFiles(const RenderJob& job, const Scene& scene) {
   if (job.mayUseProduct())
     for (const LobeRequest& request : lobeRequests(scene))
       read.push_back(job.cacheFolder / lobeFileName(request.model, request.key));
-  for (const auto& path : writtenBy(job)) checkNotRead(path, read);
+  checkOutputs(writtenBy(job), read);
 }
 
 }  // namespace lobe

@@ -1,6 +1,7 @@
 #include "runtime/tools/tool.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -11,8 +12,11 @@
 #include <cstring>
 #include <iostream>
 #include <new>
+#include <set>
 #include <string_view>
 #include <system_error>
+#include <utility>
+#include <variant>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -152,6 +156,18 @@ bool parse(CLI::App& app, const std::string& name, int argc, char** argv, const 
   }
 }
 
+/// Device and inode of a file that exists; otherwise where writing would create it.
+using FileIdentity = std::variant<std::pair<dev_t, ino_t>, std::filesystem::path>;
+
+FileIdentity identityOf(const std::filesystem::path& path) {
+  struct stat status;
+  if (::stat(path.c_str(), &status) == 0) return std::pair(status.st_dev, status.st_ino);
+  std::error_code error;
+  const std::filesystem::path created = std::filesystem::absolute(followLinks(path), error);
+  const std::filesystem::path place = std::filesystem::weakly_canonical(created, error);
+  return error ? created : place;
+}
+
 }  // namespace
 
 void printDiagnostic(std::string_view text) {
@@ -215,24 +231,38 @@ std::string shellQuoted(const std::string& word) {
   return text + "'";
 }
 
-void checkNotRead(const std::filesystem::path& output, const std::vector<std::filesystem::path>& inputs) {
-  std::error_code error;
-  if (!std::filesystem::exists(output, error)) return;
+bool isSameFile(const std::filesystem::path& a, const std::filesystem::path& b) {
+  return identityOf(a) == identityOf(b);
+}
+
+void checkOutputs(const std::vector<std::filesystem::path>& outputs, const std::vector<std::filesystem::path>& inputs) {
+  std::set<FileIdentity> read, written;
   for (const std::filesystem::path& input : inputs)
-    if (std::filesystem::equivalent(input, output, error))  // false if the input does not exist
-      throw UsageError(fmt::format("{}: is both an input and the output, and would be overwritten", output.string()));
+    if (!input.empty()) read.insert(identityOf(input));
+  for (const std::filesystem::path& output : outputs) {
+    if (output.empty()) continue;
+    const FileIdentity identity = identityOf(output);
+    if (read.contains(identity))
+      throw UsageError(fmt::format("{}: is both an input and an output, and would be overwritten", output.string()));
+    if (!written.insert(identity).second)
+      throw UsageError(fmt::format("{}: is used for more than one output, and would be overwritten", output.string()));
+  }
 }
 
 void OutputErrors::attempt(const std::filesystem::path& path, const std::function<void()>& write) {
   try {
     write();
   } catch (const OutOfMemory& e) {
-    errors_.emplace_back(e.what());
+    add(e.what());
   } catch (const std::bad_alloc&) {
-    errors_.push_back(path.string() + ": not enough memory");
+    add(path.string() + ": not enough memory");
   } catch (const std::exception& e) {
-    errors_.emplace_back(e.what());
+    add(e.what());
   }
+}
+
+void OutputErrors::add(const std::string& message) {
+  if (errors_.empty() || errors_.back() != message) errors_.push_back(message);
 }
 
 void OutputErrors::throwIfAny() const {

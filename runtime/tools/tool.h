@@ -57,19 +57,26 @@ void printNote(const std::string& name, const std::string& message);
 /// Quotes the word for the shell if necessary.
 std::string shellQuoted(const std::string& word);
 
-/// Throws UsageError if writing output would overwrite one of the inputs, also by other names of the same file.
-void checkNotRead(const std::filesystem::path& output, const std::vector<std::filesystem::path>& inputs);
+/// Whether two names are those of one file: also hard links, and symbolic links, whose target need not exist.
+bool isSameFile(const std::filesystem::path& a, const std::filesystem::path& b);
+
+/// Throws UsageError if writing an output would overwrite one of the inputs or another output (isSameFile). Empty paths
+/// are ignored.
+void checkOutputs(const std::vector<std::filesystem::path>& outputs, const std::vector<std::filesystem::path>& inputs);
 
 /// Collects the errors of outputs, so that one that fails does not prevent the others.
 class OutputErrors {
  public:
-  /// Calls `write`; if it throws, its message is added to the errors.
+  /// Calls `write`; if it throws, its message is added to the errors, unless it is that of the error before, as if a
+  /// folder for several files cannot be created.
   void attempt(const std::filesystem::path& path, const std::function<void()>& write);
   const std::vector<std::string>& all() const { return errors_; }
   /// Throws std::runtime_error with one line for each error, if there are any.
   void throwIfAny() const;
 
  private:
+  void add(const std::string& message);
+
   std::vector<std::string> errors_;
 };
 

@@ -197,17 +197,61 @@ TEST_CASE("fitter: if one lobe fails the caches of the others are complete") {
   std::vector<fs::path> names;
   for (const auto& entry : fs::directory_iterator(folder / "clean")) names.push_back(entry.path().filename());
   REQUIRE(names.size() == 6);
-  // A folder takes the place of one cache file, so its lobe fails while the others are being fitted.
-  for (const fs::path& obstacle : names) {
+  // Folders take the place of two cache files, so their lobes fail while the others are being fitted.
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::array obstacles{names[i], names[(i + 1) % names.size()]};
     fs::remove_all(folder / "b");
-    fs::create_directories(folder / "b" / obstacle);
-    const ToolRun r = runBinary(folder.path(), fit + "b");
+    for (const fs::path& obstacle : obstacles) fs::create_directories(folder / "b" / obstacle);
+    const ToolRun r = runBinary(folder.path(), fit + "b --json");
     CHECK(r.code == 1);
-    CHECK_THAT(r.error, Catch::Contains(obstacle.string()) && Catch::Contains("the other 5 lobes are written"));
-    fs::remove(folder / "b" / obstacle);
+    CHECK_THAT(r.error, Catch::Contains("4 of 6 lobes written to b"));
+    CHECK(parseJson(r.out).size() == 4);
+    for (const fs::path& obstacle : obstacles) {
+      CHECK_THAT(r.error, Catch::Contains("lobefit: error: b/" + obstacle.string() + ": cannot write: is a directory"));
+      CHECK(r.out.find(obstacle.string()) == std::string::npos);
+      fs::remove(folder / "b" / obstacle);
+    }
     CHECK(runBinary(folder.path(), fit + "b").code == 0);
     for (const fs::path& name : names) CHECK(readFile(folder / "b" / name) == readFile(folder / "clean" / name));
   }
+}
+
+TEST_CASE("fitter: a folder that cannot be created is one error") {
+  const Folder folder;
+  writeAtomically(folder / "scene.xml", std::string(kTwoMaterials));
+  writeAtomically(folder / "file", std::string("no folder"));
+  const ToolRun r =
+      runBinary(folder.path(), "lobefit scene.xml -D roughness=0.2 --elevations 4 --samples 256 -o file/lobes");
+  CHECK(r.code == 1);
+  CHECK_THAT(r.error, Catch::Contains("0 of 2 lobes written") && Catch::Contains("file/lobes: cannot create folder"));
+  CHECK(lineCount(r.error) == 2);
+  CHECK(r.out.empty());
+}
+
+TEST_CASE("fitter: no cache replaces a file that is read") {
+  const Folder folder;
+  writeAtomically(folder / "scene.xml", std::string(kTwoMaterials));
+  const std::string fit = "lobefit scene.xml -D roughness=0.2 --elevations 4 --samples 256";
+  REQUIRE(runBinary(folder.path(), fit).code == 0);
+  std::vector<fs::path> caches;
+  for (const auto& entry : fs::directory_iterator(folder / "lobes")) caches.push_back(entry.path());
+  REQUIRE(caches.size() == 2);
+  const std::string scene = readFile(folder / "scene.xml"), cache = readFile(caches[1]);
+  const auto checkRefused = [&] {
+    const ToolRun r = runBinary(folder.path(), fit);
+    CHECK(r.code == 2);
+    CHECK_THAT(r.error, Catch::Contains(caches[0].filename().string() + ": is both an input and an output"));
+    CHECK(readFile(folder / "scene.xml") == scene);
+    CHECK(readFile(caches[1]) == cache);
+    fs::remove(caches[0]);
+  };
+  fs::remove(caches[0]);
+  fs::create_symlink("../scene.xml", caches[0]);
+  checkRefused();
+  fs::create_hard_link(folder / "scene.xml", caches[0]);
+  checkRefused();
+  fs::create_symlink(caches[1].filename(), caches[0]);
+  checkRefused();
 }
 
 TEST_CASE("fitter: a fit that is cancelled from outside throws instead of returning a partial result") {

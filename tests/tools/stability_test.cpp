@@ -223,6 +223,50 @@ TEST_CASE("tools: no output replaces a file that the run reads") {
   CHECK(folder.run("lobedump " + cache + " --scene scene.xml --plot wall.png").code == 2);
 }
 
+TEST_CASE("tools: hard links to files that the run reads are not replaced") {
+  const SceneFolder folder(true);
+  REQUIRE(folder.run(kRender + " --save-illumination a.illum --checkpoint run.ckpt").code == 0);
+  const std::string cache = fs::relative(folder.caches().front(), folder.path()).string();
+  for (const auto& [input, options] :
+       std::vector<std::pair<std::string, std::string>>{{"scene.xml", kTraining},
+                                                        {cache, kTraining},
+                                                        {"a.illum", " --illumination a.illum"},
+                                                        {"run.ckpt", kTraining + " --resume run.ckpt"},
+                                                        {"a.exr", kTraining + " --reference a.exr --convergence c"}}) {
+    fs::create_hard_link(folder / input, folder / "link");
+    CHECK_THAT(fault(folder, "loberender scene.xml --spp 2 -o b.exr --stats link" + options, 2),
+               Contains("link: is both an input and an output"));
+    fs::remove(folder / "link");
+  }
+}
+
+TEST_CASE("tools: no two outputs are one file") {
+  const SceneFolder folder(false);
+  REQUIRE(folder.run(kPath + " --spp 1 -o whole.exr").code == 0);
+  fs::create_hard_link(folder / "whole.exr", folder / "hard.exr");
+  fs::create_symlink("s.json", folder / "a.exr");  // the targets of these do not exist
+  fs::create_symlink("c.exr", folder / "b.exr");
+  for (const std::string outputs : {"-o a.exr --stats s.json", "-o a.exr --stats ./s.json", "-o b.exr -o c.exr",
+                                    "-o c.exr -o b.exr", "-o d.exr -o ./d.exr", "-o whole.exr -o hard.exr"})
+    CHECK_THAT(fault(folder, kPath + " --spp 1 " + outputs, 2), Contains("is used for more than one output"));
+  const ToolRun merge = folder.run("lobecompare whole.exr whole.exr --merge b.exr --variance c.exr");
+  CHECK(merge.code == 2);
+  CHECK_THAT(merge.error, Contains("is used for more than one output"));
+}
+
+TEST_CASE("loberender: all outputs that cannot be written are reported before rendering") {
+  const SceneFolder folder(false);
+  const std::set<std::string> before = folder.names();
+  const ToolRun render =
+      folder.run(kPath + " --spp 1 -o /nonexistent/a.exr -o b.exr --stats /nonexistent/s.json --checkpoint /dev/null");
+  CHECK(render.code == 1);
+  CHECK(render.error ==
+        "loberender: error: /nonexistent/a.exr: cannot write: No such file or directory\n"
+        "loberender: error: /nonexistent/s.json: cannot write: No such file or directory\n"
+        "loberender: error: /dev/null: cannot write: not a regular file\n");
+  CHECK(folder.names() == before);
+}
+
 TEST_CASE("loberender: an interrupted render writes the picture so far") {
   for (const auto& [signal, code] : {std::pair(SIGINT, 130), std::pair(SIGTERM, 143)}) {
     const SceneFolder folder(false);
@@ -362,7 +406,7 @@ TEST_CASE("loberender: a checkpoint of another run is refused") {
   CHECK_THAT(refusal("loberender other.xml -o a.exr --spp 2" + kTraining),
              Contains("the hash of scene and camera was"));
   CHECK_THAT(refusal("loberender scene.xml -o a.exr --spp 2 --illumination a.illum"), Contains("another run"));
-  CHECK_THAT(fault(folder, render + " --resume a.exr", 2), Contains("used for more than one file"));
+  CHECK_THAT(fault(folder, render + " --resume a.exr", 2), Contains("both an input and an output"));
   CHECK_THAT(fault(folder, render + " --resume a.illum", 1), Contains("a Lobe file of kind 'ILLU', expected 'CKPT'"));
   folder.write("run.ckpt", folder.bytes("run.ckpt").substr(0, 5000));
   CHECK_THAT(refusal(render), Contains("run.ckpt: truncated"));
