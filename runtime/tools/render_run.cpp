@@ -102,7 +102,7 @@ class Run {
   Run(const Run&) = delete;
   Run& operator=(const Run&) = delete;
 
-  /// Everything before the first sample. Writes only the plot of a record.
+  /// Everything before the first new sample. Writes only the plot of a record.
   void prepare();
   /// Renders, with snapshots, until the end or until it is stopped.
   void render();
@@ -191,6 +191,7 @@ void Run::prepare() {
   if (job_.guided()) makeGuiding();
   if (receiver) drawRecord(job_, *renderScene_, *receiver, guiding_.training, errors_);
   integrator_ = makeIntegrator(job_, *renderScene_, *camera_, guiding_);
+  addFeatures();  // of the samples of the run that this one resumes
 }
 
 void Run::readCheckpoint() {
@@ -292,7 +293,6 @@ void Run::snapshot() {
 
 void Run::render() {
   saveTraining();
-  addFeatures();  // of the samples of the run that this one resumes
   Progress progress("rendering", 1);
   double done = 0;
   sinceSnapshot_ = Stopwatch();
@@ -398,7 +398,7 @@ void run(const RenderJob& job, const StopFlag& stop) {
   job.validate();
   checkFiles(job);
   Run run(job, stop);
-  stoppable(stop, "before the first sample, so no picture is written", [&] { run.prepare(); });
+  stoppable(stop, "before rendering, so no picture is written", [&] { run.prepare(); });
   try {
     run.render();
   } catch (const std::exception&) {

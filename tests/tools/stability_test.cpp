@@ -1,9 +1,12 @@
 // What the tools do when files, pipes and signals fail: diagnostics are never essential, one output does not take the
 // others with it, and inputs are never overwritten.
 
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
+#include <set>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -286,7 +289,7 @@ TEST_CASE("loberender: an interrupted render writes the picture so far") {
   }
 }
 
-TEST_CASE("loberender: an interruption before the first sample writes nothing") {
+TEST_CASE("loberender: an interruption before rendering writes nothing") {
   const SceneFolder folder(true);
   folder.write("noted.xml", sceneWithNote());
   Background render(folder, "loberender noted.xml -o a.exr --spp 4 --passes 1000000 --checkpoint run.ckpt");
@@ -294,9 +297,27 @@ TEST_CASE("loberender: an interruption before the first sample writes nothing") 
   const std::set<std::string> before = folder.names();
   render.send(SIGTERM);
   CHECK(render.wait() == 143);
-  CHECK_THAT(folder.bytes("error"), Contains("loberender: interrupted: before the first sample"));
+  CHECK_THAT(folder.bytes("error"), Contains("loberender: interrupted: before rendering"));
   CHECK(folder.names() == before);
   CHECK_FALSE(folder.has("a.exr"));
+}
+
+TEST_CASE("loberender: an interruption ends the tracing of the AOVs of a resumed render") {
+  const SceneFolder folder(false);
+  REQUIRE(folder.run(kPath + " --spp 1 -o a.exr --checkpoint run.ckpt").code == 0);
+  // A checkpoint with more samples than can be traced in the time limit of tests.
+  const CheckpointFile file = CheckpointFile::open(folder / "run.ckpt");
+  std::vector<StoredPixel> pixels(file.pixels().begin(), file.pixels().end());
+  for (StoredPixel& pixel : pixels) pixel.count = 1000000000;
+  const std::vector<std::byte> bytes = encodeCheckpoint(file.info(), pixels, {}, {});
+  writeAtomically(folder / "run.ckpt", std::span<const std::byte>(bytes));
+  Background render(folder, kPath + " --spp 1000000001 -o b.exr --aov albedo --resume run.ckpt");
+  waitFor([&] { return folder.bytes("error").find("continues with sample") != std::string::npos; });
+  std::this_thread::sleep_for(std::chrono::seconds(2));  // until the AOVs are traced
+  render.send(SIGTERM);
+  CHECK(render.wait() == 143);
+  CHECK_THAT(folder.bytes("error"), Contains("loberender: interrupted: before rendering"));
+  CHECK_FALSE(folder.has("b.exr"));
 }
 
 TEST_CASE("lobefit: an interruption keeps the caches that are complete") {

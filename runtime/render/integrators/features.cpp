@@ -109,6 +109,7 @@ void FeatureFilm::addMissing(const Film& film, const RenderScene& scene, const R
     for (int x = 0; x < width_; ++x) {
       Pixel& pixel = pixels_[static_cast<std::size_t>(y) * width_ + x];
       for (; pixel.samples < film.pixel(x, y).samples(); ++pixel.samples) {
+        throwIfCancelled();
         Sampler rng = options.sampler(static_cast<std::uint64_t>(y) * width_ + x, static_cast<int>(pixel.samples));
         const Features features = featuresAlong(scene, camera, camera.sample(x, y, rng), scene.scene.emitterVisibility);
         pixel.albedo += features.albedo.cast<double>();

@@ -35,7 +35,7 @@ class FeatureFilm {
       : width_(width), height_(height), pixels_(static_cast<std::size_t>(width) * height) {}
 
   /// Adds to each pixel the number of samples that the film, of the same size, has more. options: those with which the
-  /// picture is rendered.
+  /// picture is rendered. Throws LoopCancelled if an enclosing loop or task is cancelled.
   void addMissing(const Film& film, const RenderScene& scene, const RayCamera& camera, const RenderOptions& options);
 
   /// Means over the samples of each pixel; zero without samples.

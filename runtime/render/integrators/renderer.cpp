@@ -219,7 +219,7 @@ class GridRenderer {
   std::vector<SampleGrid> grids_;
 };
 
-/// Renders sample by sample, each of all pixels.
+/// Renders sample by sample, each of all pixels. A sample that is interrupted is discarded.
 class ImageRenderer {
  public:
   ImageRenderer(const RayCamera& camera, const AddImageSample& addSample, const Film& film,
@@ -228,10 +228,11 @@ class ImageRenderer {
 
   /// Adds samples until every pixel has `samples` of them.
   void render(int samples, Wave& wave) {
-    for (int s = static_cast<int>(film_.sampleRange().first); s < samples; ++s) {
-      wave.complete = !isSet(options_.stop);
-      if (!wave.complete) break;
-      wave.statistics += addSample_(OneSample(camera_, tiles_, options_, s));
+    try {
+      for (int s = static_cast<int>(film_.sampleRange().first); s < samples; ++s)
+        wave.statistics += addSample_(OneSample(camera_, tiles_, options_, s));
+    } catch (const Stopped&) {
+      wave.complete = false;
     }
   }
 
@@ -244,13 +245,14 @@ class ImageRenderer {
     Vec2 offset() const override { return gridOffset(camera_, options_, sample_); }
     int tiles() const override { return tiles_.count(); }
     PathStatistics forEachPixel(const VisitPixel& visit) const override {
-      return tiles_
-          .render([] { return false; },
-                  [&](int x, int y, int tile, PathStatistics& statistics) {
-                    Sampler rng = tiles_.sampler(x, y, sample_), lightRng = tiles_.lightSampler(x, y, sample_);
-                    visit(x, y, tile, rng, lightRng, statistics);
-                  })
-          .statistics;
+      const Wave wave = tiles_.render([&] { return isSet(options_.stop); },
+                                      [&](int x, int y, int tile, PathStatistics& statistics) {
+                                        Sampler rng = tiles_.sampler(x, y, sample_),
+                                                lightRng = tiles_.lightSampler(x, y, sample_);
+                                        visit(x, y, tile, rng, lightRng, statistics);
+                                      });
+      if (!wave.complete) throw Stopped("a sample of all pixels was interrupted");
+      return wave.statistics;
     }
 
    private:

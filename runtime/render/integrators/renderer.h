@@ -82,11 +82,12 @@ class ImageSample {
   /// Random numbers for the pixel's camera path, and independent ones for a light path.
   using VisitPixel =
       std::function<void(int x, int y, int tile, Sampler& rng, Sampler& lightRng, PathStatistics& statistics)>;
-  /// Calls `visit` for all pixels and for those of the border, in parallel by tiles.
+  /// Calls `visit` for all pixels and for those of the border, in parallel by tiles. Throws Stopped, which ends the
+  /// sample, if RenderOptions::stop is set before all tiles have begun.
   virtual PathStatistics forEachPixel(const VisitPixel& visit) const = 0;
 };
 
-/// Adds one sample to every pixel of a film.
+/// Adds one sample to every pixel of a film, or none if ImageSample throws.
 using AddImageSample = std::function<PathStatistics(const ImageSample& sample)>;
 
 /// Called after each wave, from the calling thread, while no thread writes to the film.
@@ -103,7 +104,7 @@ RenderResult render(const RayCamera& camera, const Integrator& integrator, Film&
 RenderResult render(const RayCamera& camera, const AddSample& addSample, const Film& film, const RenderOptions& options,
                     const AfterWave& afterWave = {}, const RenderResult& before = {});
 /// The same for samples that are made for all pixels together, without a border: addSample must add exactly one sample
-/// to each pixel of the film. Rendering is only stopped between samples, so that all pixels have equally many; a film
+/// to each pixel of the film. A sample that is interrupted is discarded, so that all pixels have equally many; a film
 /// that is continued must be like that.
 RenderResult render(const RayCamera& camera, const AddImageSample& addSample, const Film& film,
                     const RenderOptions& options, const AfterWave& afterWave = {}, const RenderResult& before = {});
