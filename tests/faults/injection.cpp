@@ -10,6 +10,7 @@
 
 #include <fcntl.h>
 #include <sys/syscall.h>
+#include <sys/types.h>
 #include <unistd.h>
 
 #include <fmt/format.h>
@@ -101,6 +102,36 @@ extern "C" ssize_t read(int file, void* bytes, std::size_t size) {
     return -1;
   }
   return ::syscall(SYS_read, file, bytes, size);
+}
+
+// These replace those of the C library for our own code only, because libraries also use them for other things than
+// files that are written. The linker redirects our calls to them (--wrap in tests/CMakeLists.txt).
+extern "C" {
+int openOrFail(const char* path, int flags, mode_t mode) asm("__wrap_open");
+int closeOrFail(int file) asm("__wrap_close");
+int fchmodOrFail(int file, mode_t mode) asm("__wrap_fchmod");
+}
+int openOrFail(const char* path, int flags, mode_t mode) {
+  if (lobe::test::writes.fails()) {
+    errno = EMFILE;
+    return -1;
+  }
+  return static_cast<int>(::syscall(SYS_openat, AT_FDCWD, path, flags, mode));
+}
+int closeOrFail(int file) {
+  const long result = ::syscall(SYS_close, file);  // also if it fails, as on Linux
+  if (lobe::test::writes.fails()) {
+    errno = EIO;
+    return -1;
+  }
+  return static_cast<int>(result);
+}
+int fchmodOrFail(int file, mode_t mode) {
+  if (lobe::test::writes.fails()) {
+    errno = EPERM;
+    return -1;
+  }
+  return static_cast<int>(::syscall(SYS_fchmod, file, mode));
 }
 
 // The functions by which oneTBB's headers get the memory of a task. The linker redirects the calls from our code to

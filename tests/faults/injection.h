@@ -17,8 +17,8 @@ struct Countdown {
   bool fails() { return enabled && ++calls == failing; }
 };
 
-/// Allocations by operator new; tasks that our parallel loops start; writing, synchronising and renaming of files; and
-/// reads from files.
+/// Allocations by operator new; tasks that our parallel loops start; what writes a file, from opening it to renaming
+/// it; and reads from files.
 extern Countdown allocations, tasks, writes, reads;
 
 class Injection {

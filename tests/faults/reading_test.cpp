@@ -1,4 +1,4 @@
-// Faults while a scene with images and meshes of all formats is read: whichever allocation, task or read fails, reading
+// Faults while a scene with images and meshes of all formats is read: if an allocation, task or read fails, reading
 // throws, or the scene is the same as without faults. In particular, no image, mesh or material is missing or replaced.
 
 #include <filesystem>
@@ -78,11 +78,11 @@ int injectInto(Countdown& countdown, bool lenient) {
 
 }  // namespace
 
-TEST_CASE("faults: whichever read of a scene, its images and its meshes fails") {
+TEST_CASE("faults: failing reads of a scene, its images and its meshes") {
   CHECK(injectInto(reads, false) > 10);
 }
 
-TEST_CASE("faults: whichever allocation or task fails while a scene, its images and its meshes are read") {
+TEST_CASE("faults: failing allocations and tasks while a scene, its images and its meshes are read") {
   for (const bool lenient : {false, true}) {
     CHECK(injectInto(allocations, lenient) > 50);
     CHECK(injectInto(tasks, lenient) > 0);

@@ -1,6 +1,5 @@
-// Faults in lobecompare and lobedump, whose main functions run in this process: whichever allocation, write or read
-// fails, the exit code is not 0, a message says so, and nothing is half-written; or the outputs are those of a run
-// without faults.
+// Faults in lobecompare and lobedump, whose main functions run in this process: if a write or read fails, the exit code
+// is not 0, a message says so, and nothing is half-written; or the outputs are those of a run without faults.
 
 #include <cstdio>
 #include <filesystem>
@@ -9,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include <fcntl.h>
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
@@ -35,9 +33,10 @@ class Redirected {
   Redirected(std::FILE* stream, const fs::path& path) : stream_(stream) {
     std::fflush(stream);
     before_ = dup(fileno(stream));
-    const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0666);
-    dup2(file, fileno(stream));
-    close(file);
+    std::FILE* const file = std::fopen(path.c_str(), "wb");  // not made to fail, unlike open
+    REQUIRE(file);
+    dup2(fileno(file), fileno(stream));
+    std::fclose(file);
   }
   Redirected(const Redirected&) = delete;
   Redirected& operator=(const Redirected&) = delete;
@@ -135,10 +134,10 @@ void injectIntoDumps(Countdown& countdown) {
 
 }  // namespace
 
-TEST_CASE("faults: whichever write or read of lobecompare fails") {
+TEST_CASE("faults: failing writes and reads of lobecompare") {
   for (Countdown* countdown : {&writes, &reads}) injectIntoComparisons(*countdown);
 }
 
-TEST_CASE("faults: whichever write or read of lobedump fails") {
+TEST_CASE("faults: failing writes and reads of lobedump") {
   for (Countdown* countdown : {&writes, &reads}) injectIntoDumps(*countdown);
 }
