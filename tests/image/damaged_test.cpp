@@ -46,8 +46,14 @@ TEST_CASE("render: a small PNG that claims a large size is rejected") {
   CHECK_THROWS_WITH(readBytes("a.png", pngThatClaims(10000, 10000)),
                     Contains("a.png: a file of") && Contains("cannot contain 10000x10000 pixels"));
   CHECK_THROWS_WITH(readBytes("a.png", pngThatClaims(16000, 16000)),
-                    Contains("a.png: its size of 16000x16000 pixels is outside the supported range"));
+                    Contains("a.png: its size of 16000x16000 pixels is over the limit of 2^27 pixels"));
   CHECK_THROWS_WITH(readBytes("a.png", pngThatClaims(0xffffffff, 0xffffffff)), Contains("a.png: "));
+}
+
+TEST_CASE("render: empty images are rejected") {
+  // A BMP with the older header of 12 bytes and a width of 0.
+  const std::string bytes{"BM\x1a\0\0\0\0\0\0\0\x1a\0\0\0\x0c\0\0\0\0\0\3\0\1\0\x18\0", 26};
+  CHECK_THROWS_WITH(readBytes("a.bmp", bytes), Contains("a.bmp: an image of 0x3 pixels is empty"));
 }
 
 TEST_CASE("render: an EXR whose attribute claims more bytes than the file has is rejected") {
