@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <openexr.h>
 
+#include "runtime/core/vec.h"
 #include "runtime/image/image_limits.h"
 
 namespace lobe {
@@ -26,14 +27,58 @@ struct Finish {
 };
 using Context = std::unique_ptr<std::remove_pointer_t<exr_context_t>, Finish>;
 
-void checkWindow(const std::filesystem::path& path, const exr_attr_box2i_t& window, std::uintmax_t length) {
-  // DWA compression keeps 2 bytes for 64 pixels of a channel, and zlib then shortens them by a factor of up to 1032.
-  constexpr std::uintmax_t kMostPerByte = 40000;
-  constexpr std::int64_t kMostLinesTogether = 256;  // with DWAB compression
-  const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1,
-                     height = std::int64_t{window.max.y} - window.min.y + 1;
-  checkImageSize(path, width, height, length, kMostPerByte);
-  checkImageSize(path, width, std::max(height, kMostLinesTogether), length, kMostPerByte);
+struct Size {
+  explicit Size(const exr_attr_box2i_t& window)
+      : width(std::int64_t{window.max.x} - window.min.x + 1), height(std::int64_t{window.max.y} - window.min.y + 1) {}
+  std::int64_t width, height;
+};
+
+/// The pixels of the data window are in the file.
+void checkDataWindow(const std::filesystem::path& path, exr_const_context_t file, const Size& data,
+                     std::uintmax_t length) {
+  exr_compression_t compression{};
+  exr_get_compression(file, 0, &compression);
+  // DWA compression stores 64 pixels of a channel in at least 4 bytes, which zlib shortens by a factor of up to 1032.
+  const bool isDwa = compression == EXR_COMPRESSION_DWAA || compression == EXR_COMPRESSION_DWAB;
+  checkImageSize(path, data.width, data.height, length, isDwa ? 20000 : 2000);
+}
+
+/// Pixels of the display window outside the data window take no bytes.
+void checkDisplayWindow(const std::filesystem::path& path, const Size& data, const Size& display) {
+  constexpr std::int64_t kMostPerPixel = 16;
+  checkPixelCount(path, display.width, display.height);
+  if (display.width * display.height > std::max(kHarmlessPixels, kMostPerPixel * data.width * data.height))
+    throw std::runtime_error(
+        fmt::format("{}: its display window of {}x{} pixels is over the limit of 2^24 pixels or {} times those of the "
+                    "data window, which has {}x{}",
+                    path.string(), display.width, display.height, kMostPerPixel, data.width, data.height));
+}
+
+/// The size of what OpenEXR decompresses at a time: all channels of some lines, whether the image has them or not, or
+/// of a tile. Of tiles it keeps a row.
+std::uintmax_t blockBytes(exr_const_context_t file, std::int64_t width) {
+  std::uint64_t bytes = 0;
+  exr_get_chunk_unpacked_size(file, 0, &bytes);
+  exr_storage_t storage{};
+  exr_get_storage(file, 0, &storage);
+  if (storage != EXR_STORAGE_TILED) return bytes;
+  std::uint32_t tileWidth = 0, tileHeight = 0;
+  exr_tile_level_mode_t levels{};
+  exr_tile_round_mode_t rounding{};
+  exr_get_tile_descriptor(file, 0, &tileWidth, &tileHeight, &levels, &rounding);
+  return std::max<std::uintmax_t>(bytes, sizeof(Rgb) * static_cast<std::uintmax_t>(width) * tileHeight);
+}
+
+void checkBlocks(const std::filesystem::path& path, exr_const_context_t file, std::int64_t width,
+                 std::uintmax_t length) {
+  // Enough for 256 lines of 16384 pixels with four channels of 32 bits.
+  constexpr std::uintmax_t kHarmless = std::uintmax_t{1} << 26, kMostPerByte = 256;
+  const std::uintmax_t bytes = blockBytes(file, width), limit = std::max(kHarmless, kMostPerByte * length);
+  if (bytes > limit)
+    throw std::runtime_error(
+        fmt::format("{}: its lines or tiles are compressed in blocks of {} bytes, which is over "
+                    "the limit of {} bytes for a file of {} bytes",
+                    path.string(), bytes, limit, length));
 }
 
 /// OpenEXRCore reports sizes of attributes that do not fit the file or the type, which Imf::InputFile does not.
@@ -52,8 +97,10 @@ void checkHeader(const std::filesystem::path& path) {
   exr_get_data_window(opened, 0, &data);
   exr_get_display_window(opened, 0, &display);
   const std::uintmax_t length = std::filesystem::file_size(path);
-  checkWindow(path, data, length);
-  checkWindow(path, display, length);
+  const Size size(data);
+  checkDataWindow(path, opened, size, length);
+  checkDisplayWindow(path, size, Size(display));
+  checkBlocks(path, opened, size.width, length);
 }
 
 }  // namespace

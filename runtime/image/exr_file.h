@@ -31,8 +31,8 @@ auto nameExrErrors(const std::filesystem::path& path, Read&& read) {
 }
 
 /// Opens the file after checking what its header claims, because OpenEXR allocates memory for the attributes and lines
-/// of pixels before it reads them. Throws std::runtime_error if the header is damaged or the image too large
-/// (image_limits.h).
+/// of pixels before it reads them. Throws std::runtime_error if the header is damaged, or if the image (image_limits.h)
+/// or the blocks in which it is compressed are too large.
 std::unique_ptr<Imf::InputFile> openExr(const std::filesystem::path& path);
 
 }  // namespace lobe

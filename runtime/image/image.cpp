@@ -11,6 +11,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <fstream>
 #include <limits>
 #include <memory>
@@ -95,40 +96,41 @@ struct Area {
         top(window.min.y),
         width(std::int64_t{window.max.x} - window.min.x + 1),
         height(std::int64_t{window.max.y} - window.min.y + 1) {}
-  bool operator==(const Area&) const = default;
+  std::int64_t right() const { return left + width; }
+  std::int64_t bottom() const { return top + height; }
   std::int64_t left, top, width, height;
 };
 
-/// Crops or pads the data window to the display window; pixels outside the data window are black.
-Image placeOnDisplay(const Image& data, const Area& dataWindow, const Area& display) {
-  Image image(static_cast<int>(display.width), static_cast<int>(display.height));
-  const std::int64_t dx = display.left - dataWindow.left, dy = display.top - dataWindow.top;
-  const std::int64_t first = std::max<std::int64_t>(0, -dx), last = std::min(display.width, dataWindow.width - dx);
-  if (first >= last) return image;
-  for (std::int64_t y = std::max<std::int64_t>(0, -dy); y < std::min(display.height, dataWindow.height - dy); ++y)
-    std::copy_n(&data.pixels[(y + dy) * data.width + first + dx], last - first, &image.pixels[y * image.width + first]);
-  return image;
-}
-
-/// Reads the requested channels of the data window.
-Image readDataWindow(const std::filesystem::path& path, Imf::InputFile& file, const Area& area,
-                     const ChannelNames& names) {
-  const int distinct = names[0] == names[1] ? 1 : 3;
-  Image image(static_cast<int>(area.width), static_cast<int>(area.height));
+/// Makes OpenEXR read the requested channels of any line of the data window into this one.
+void readInto(std::vector<Rgb>& line, const std::filesystem::path& path, Imf::InputFile& file, const Area& data,
+              const ChannelNames& names) {
   // OpenEXR addresses pixels by their coordinates in the data window, hence the shifted origin.
   constexpr std::int64_t kStride = sizeof(Rgb);
-  char* origin = reinterpret_cast<char*>(image.pixels.data()) - kStride * (area.left + area.top * area.width);
+  char* origin = reinterpret_cast<char*>(line.data()) - kStride * data.left;
   Imf::FrameBuffer frame;
-  for (int c = 0; c < distinct; ++c) {
+  for (std::size_t c = 0; c < names.size() && (c == 0 || names[c] != names[0]); ++c) {
     const Imf::Channel& channel = file.header().channels()[names[c]];
     if (channel.xSampling != 1 || channel.ySampling != 1) fail(path, "subsampled channels are not supported");
-    frame.insert(names[c], Imf::Slice(Imf::FLOAT, origin + c * sizeof(float), kStride, kStride * area.width));
+    frame.insert(names[c], Imf::Slice(Imf::FLOAT, origin + c * sizeof(float), kStride, 0));
   }
   file.setFrameBuffer(frame);
-  const Imath::Box2i window = file.header().dataWindow();
-  file.readPixels(window.min.y, window.max.y);
-  if (distinct == 1)
-    for (Rgb& pixel : image.pixels) pixel = Rgb::Constant(pixel.x());
+}
+
+/// Reads the requested channels of the display window line by line; pixels outside the data window are black.
+Image readDisplayWindow(const std::filesystem::path& path, Imf::InputFile& file, const ChannelNames& names) {
+  const Area data(file.header().dataWindow()), display(file.header().displayWindow());
+  Image image(static_cast<int>(display.width), static_cast<int>(display.height));
+  std::vector<Rgb> line(static_cast<std::size_t>(data.width));
+  readInto(line, path, file, data, names);
+  const std::int64_t left = std::max(data.left, display.left), right = std::min(data.right(), display.right());
+  if (left >= right) return image;
+  for (std::int64_t y = std::max(data.top, display.top); y < std::min(data.bottom(), display.bottom()); ++y) {
+    file.readPixels(static_cast<int>(y));
+    if (names[1] == names[0])
+      for (Rgb& pixel : line) pixel = Rgb::Constant(pixel.x());
+    std::copy_n(&line[left - data.left], right - left,
+                &image.pixels[(y - display.top) * display.width + left - display.left]);
+  }
   return image;
 }
 
@@ -139,9 +141,7 @@ std::optional<Image> readExrPixels(const std::filesystem::path& path, const Name
   Imf::InputFile& file = *opened;
   const std::optional<ChannelNames> names = namesOf(file.header().channels());
   if (!names) return std::nullopt;
-  const Area data(file.header().dataWindow()), display(file.header().displayWindow());
-  Image image = readDataWindow(path, file, data, *names);
-  return data == display ? image : placeOnDisplay(image, data, display);
+  return readDisplayWindow(path, file, *names);
 }
 
 template <class NamesOf>
@@ -269,7 +269,8 @@ Image readOther(const std::filesystem::path& path, const Encoding& encoding, Par
   if (!stbi_info_from_memory(data, length, &width, &height, &channels))
     fail(path, fmt::format("unsupported image format ({}); supported are PNG, JPEG, BMP, TGA, HDR and EXR",
                            stbi_failure_reason()));
-  checkImageSize(path, width, height, bytes.size());
+  // The height of a BMP is negative if its rows are stored from the top.
+  checkImageSize(path, width, std::abs(std::int64_t{height}), bytes.size());
   if (part == Part::alpha && channels != 2 && channels != 4) failWithoutAlpha(path);
   return loadPixels(path, bytes, encoding, part);
 }

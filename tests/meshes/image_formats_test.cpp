@@ -11,6 +11,8 @@
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfOutputFile.h>
+#include <ImfTileDescription.h>
+#include <ImfTiledOutputFile.h>
 #include <catch2/catch.hpp>
 
 #include "runtime/image/image.h"
@@ -79,6 +81,18 @@ TEST_CASE("materials: 8-bit images are decoded with the requested encoding") {
   const std::filesystem::path png = folder / "a.png";
   requireNear(readImage(png, {Encoding::Kind::linear}).at(1, 0), grey(128 / 255.0f));
   requireNear(readImage(png, {Encoding::Kind::gamma, 2.0f}).at(1, 0), grey(128 * 128 / 65025.0f));
+}
+
+TEST_CASE("materials: BMP images whose rows are stored from the top are read") {
+  const Folder folder;
+  std::string bytes = pictureFile("bmp", 2, 2, kCodes);
+  constexpr std::size_t kHeight = 22;
+  const std::int32_t height = -2;
+  std::memcpy(&bytes[kHeight], &height, sizeof(height));
+  const Image image = readImage(folder.write("a.bmp", bytes));
+  REQUIRE(image.height == 2);
+  requireNear(image.at(0, 1), grey(0));
+  requireNear(image.at(0, 0), Rgb(1, 0, 0));
 }
 
 TEST_CASE("materials: JPEG and HDR images are read") {
@@ -177,6 +191,56 @@ TEST_CASE("materials: a small EXR file that claims a large image is rejected bef
   std::memcpy(&bytes[window + 2 * sizeof(right)], &right, sizeof(right));
   REQUIRE_THAT(faultOfReading([&] { readImage(folder.write("claim.exr", bytes)); }),
                Contains("claim.exr: a file of") && Contains("cannot contain 10000000x10 pixels"));
+}
+
+TEST_CASE("materials: a display window far larger than the data window of an EXR file is rejected") {
+  const Folder folder;
+  const std::filesystem::path path = folder / "a.exr";
+  writeExr(path, {"R", "G", "B"}, Imf::FLOAT, box(0, 0, 11584, 11584), box(0, 0, 39, 39), Imf::NO_COMPRESSION);
+  CHECK_THAT(faultOfReading([&] { readImage(path); }),
+             Contains("a.exr: its display window of 11585x11585 pixels is over the limit of 2^24 pixels or 16 times "
+                      "those of the data window, which has 40x40"));
+  writeExr(path, {"Y"}, Imf::HALF, box(0, 0, 1999, 999), box(0, 0, 0, 0));
+  CHECK(readImage(path).width == 2000);
+}
+
+TEST_CASE("materials: the blocks in which an EXR file is compressed are limited in size") {
+  const Folder folder;
+  const std::filesystem::path exr = folder / "small.exr";
+  const auto replace = [](std::string& bytes, const std::string& attribute, std::size_t at, std::int32_t value) {
+    std::memcpy(&bytes[bytes.find(attribute) + attribute.size() + sizeof(std::int32_t) + at], &value, sizeof(value));
+  };
+  const auto fault = [&](const std::string& bytes) {
+    return faultOfReading([&] { readImage(folder.write("a.exr", bytes)); });
+  };
+  writeExr(exr, {"Y"}, Imf::FLOAT, box(0, 0, 9, 9), box(0, 0, 9, 9), Imf::NO_COMPRESSION);
+  std::string wide = readFile(exr);
+  replace(wide, {"dataWindow\0box2i\0", 17}, 8, 99999);
+  const std::string method{"compression\0compression\0", 24};
+  wide[wide.find(method) + method.size() + sizeof(std::int32_t)] = static_cast<char>(Imf::DWAB_COMPRESSION);
+  CHECK_THAT(fault(wide),
+             Contains("a.exr: its lines or tiles are compressed in blocks of 102400000 bytes, which is over "
+                      "the limit of 67108864 bytes"));
+
+  Imf::Header header(8, 8);
+  header.channels().insert("Y", Imf::Channel(Imf::HALF));
+  header.setTileDescription(Imf::TileDescription(8, 8));
+  std::vector<half> pixels(64);
+  Imf::FrameBuffer frame;
+  frame.insert("Y", Imf::Slice(Imf::HALF, reinterpret_cast<char*>(pixels.data()), 2, 16));
+  {
+    Imf::TiledOutputFile file(exr.c_str(), header);
+    file.setFrameBuffer(frame);
+    file.writeTile(0, 0);
+  }
+  std::string tall = readFile(exr);
+  CHECK(fault(tall).empty());
+  replace(tall, {"tiles\0tiledesc\0", 15}, 4, 1 << 20);
+  CHECK_THAT(fault(tall), Contains("a.exr: its lines or tiles are compressed in blocks of 100663296 bytes"));
+
+  // A real file of few bytes with long lines and the largest blocks.
+  writeExr(exr, {"R", "G", "B"}, Imf::HALF, box(0, 0, 16383, 0), box(0, 0, 16383, 0), Imf::DWAB_COMPRESSION);
+  CHECK(readImage(exr).width == 16384);
 }
 
 TEST_CASE("materials: flipped bits in an EXR file never crash") {
