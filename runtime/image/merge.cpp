@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <tuple>
@@ -65,9 +66,14 @@ bool sameStream(const SampleRange& a, const SampleRange& b) {
   return a.integrator == b.integrator && a.seed == b.seed;
 }
 
+/// Orders ranges by their stream and, within it, by their first sample.
+bool precedes(const SampleRange& a, const SampleRange& b) {
+  return std::tie(a.integrator, a.seed, a.first) < std::tie(b.integrator, b.seed, b.first);
+}
+
 /// Sorts the ranges and joins adjacent ones.
 std::vector<SampleRange> joined(std::vector<SampleRange> ranges) {
-  std::ranges::sort(ranges, {}, [](const SampleRange& r) { return std::tuple(r.integrator, r.seed, r.first); });
+  std::ranges::sort(ranges, precedes);
   std::vector<SampleRange> result;
   for (const SampleRange& r : ranges)
     if (!result.empty() && sameStream(result.back(), r) && result.back().last == r.first)
@@ -116,16 +122,34 @@ void checkSameScene(const Part& a, const Part& b) {
                     a.path.string(), b.path.string(), *one, *other));
 }
 
-void checkDisjoint(const Part& a, const Part& b) {
-  for (const SampleRange& r : a.ranges)
-    for (const SampleRange& s : b.ranges) {
-      const std::uint64_t first = std::max(r.first, s.first), last = std::min(r.last, s.last);
-      if (sameStream(r, s) && first < last)
-        throw std::runtime_error(
-            fmt::format("{} and {}: both contain samples {} to {} of seed {} and integrator {}; change --sample-offset "
-                        "or --seed of one",
-                        a.path.string(), b.path.string(), first, last - 1, r.seed, r.integrator));
-    }
+/// A sample range and the index of the part that has it.
+struct Piece {
+  const SampleRange* range;
+  std::size_t part;
+};
+
+[[noreturn]] void failAtOverlap(const std::vector<Part>& parts, const Piece& a, const Piece& b) {
+  throw std::runtime_error(fmt::format(
+      "{} and {}: both contain samples {} to {} of seed {} and integrator {}; change --sample-offset or --seed of one",
+      parts[std::min(a.part, b.part)].path.string(), parts[std::max(a.part, b.part)].path.string(),
+      std::max(a.range->first, b.range->first), std::min(a.range->last, b.range->last) - 1, a.range->seed,
+      a.range->integrator));
+}
+
+/// Throws std::runtime_error if two parts have samples in common.
+void checkDisjoint(const std::vector<Part>& parts) {
+  std::vector<Piece> pieces;
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    for (const SampleRange& range : parts[i].ranges) pieces.push_back({&range, i});
+  std::ranges::sort(pieces, [](const Piece& a, const Piece& b) { return precedes(*a.range, *b.range); });
+  // In this order, a range overlaps an earlier one of its stream if it overlaps the one that ends last.
+  const Piece* longest = nullptr;
+  for (const Piece& piece : pieces) {
+    const bool sameAsBefore = longest && sameStream(*longest->range, *piece.range);
+    if (sameAsBefore && longest->part != piece.part && longest->range->last > piece.range->first)
+      failAtOverlap(parts, *longest, piece);
+    if (!sameAsBefore || longest->range->last < piece.range->last) longest = &piece;
+  }
 }
 
 ImageAttributes common(const std::vector<Part>& parts) {
@@ -287,11 +311,12 @@ std::vector<SampleRange> sampleRanges(const ImageAttributes& attributes) {
 }
 
 void checkDifferentSeeds(const std::filesystem::path& a, const std::filesystem::path& b) {
-  for (const SampleRange& r : rangesOf(a, readAttributes(a)))
-    for (const SampleRange& s : rangesOf(b, readAttributes(b)))
-      if (r.seed == s.seed)
-        throw std::runtime_error(fmt::format("{} and {}: both have samples of seed {}; render one with another --seed",
-                                             a.string(), b.string(), r.seed));
+  std::set<std::uint64_t> seeds;
+  for (const SampleRange& range : rangesOf(a, readAttributes(a))) seeds.insert(range.seed);
+  for (const SampleRange& range : rangesOf(b, readAttributes(b)))
+    if (seeds.contains(range.seed))
+      throw std::runtime_error(fmt::format("{} and {}: both have samples of seed {}; render one with another --seed",
+                                           a.string(), b.string(), range.seed));
 }
 
 double samplesOf(const std::filesystem::path& path) {
@@ -303,8 +328,8 @@ MergedImage mergeImages(std::span<const std::filesystem::path> paths) {
   for (const auto& path : paths) {
     parts.push_back(describe(path));
     checkSameScene(parts.front(), parts.back());
-    for (std::size_t i = 0; i + 1 < parts.size(); ++i) checkDisjoint(parts[i], parts.back());
   }
+  checkDisjoint(parts);
   Merger merger;
   for (const Part& part : parts) merger.add(part, parts.front());
   return {merger.image(), mergedAttributes(parts, merger.luminances()), merger.aovs()};

@@ -88,6 +88,30 @@ TEST_CASE("render: equal sample ranges of another seed or integrator can be merg
                             Catch::Contains("samples 3 to 3 of seed 2 and integrator path"));
 }
 
+TEST_CASE("render: overlapping ranges of one image do not hide those of another") {
+  for (const auto& [other, fault] : {std::pair{"path 1 9 10", ""}, {"path 1 8 10", "samples 8 to 8 of seed 1"}}) {
+    Pictures p;
+    p.add(1, {{"samples", 1.0}, {"sampleRanges", other}});
+    p.add(1, {{"samples", 1.0}, {"sampleRanges", "path 1 3 4, path 1 0 9, path 1 2 5"}});
+    CHECK_THAT(p.fault(), Catch::Contains(fault));
+    CHECK(p.fault().empty() == std::string(fault).empty());
+  }
+}
+
+TEST_CASE("render: images with many sample ranges are merged in time that is proportional to their number") {
+  const auto rangesOf = [](int seed, int count) {
+    std::string ranges;
+    for (int i = 0; i < count; ++i) ranges += fmt::format("{}path {} {} {}", i > 0 ? "," : "", seed, 2 * i, 2 * i + 1);
+    return ranges;
+  };
+  Pictures p;
+  for (const int seed : {1, 2}) p.add(1, {{"samples", 1.0}, {"sampleRanges", rangesOf(seed, 500000)}});
+  CHECK(std::get<double>(mergeImages(p.paths).attributes.at("samples")) == 2);
+  Pictures fewer;
+  for (const int seed : {1, 2}) fewer.add(1, {{"samples", 1.0}, {"sampleRanges", rangesOf(seed, 50000)}});
+  CHECK_NOTHROW(checkDifferentSeeds(fewer.paths[0], fewer.paths[1]));
+}
+
 TEST_CASE("render: merging keeps attributes that all images have in common except times") {
   Pictures p;
   p.add(1, {{"samples", 4.0}, {"software", "x"}, {"cacheHashes", "a"}, {"seconds", 3.0}});
