@@ -59,7 +59,7 @@ JpegPixels readJpeg(std::string_view bytes) {
   JpegPixels pixels{width, height, {}};
   pixels.codes.resize(std::size_t{4} * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   const int result = tjDecompress2(decoder.get(), dataOf(bytes), bytes.size(), pixels.codes.data(), width, 0, height,
-                                   TJPF_RGBA, TJFLAG_ACCURATEDCT);
+                                   TJPF_RGBA, TJFLAG_ACCURATEDCT | TJFLAG_LIMITSCANS);
   if (result != 0 && (tjGetErrorCode(decoder.get()) != TJERR_WARNING || endsTooEarly(decoder))) fail(decoder);
   return pixels;
 }

@@ -22,7 +22,8 @@ struct JpegSize {
 /// Throws std::runtime_error if the header is damaged.
 JpegSize sizeOfJpeg(std::string_view bytes);
 
-/// Throws std::runtime_error if the file is damaged or truncated, or std::bad_alloc.
+/// Throws std::runtime_error if the file is damaged or truncated or has more than 500 scans, which is how a small file
+/// would take long; or std::bad_alloc.
 JpegPixels readJpeg(std::string_view bytes);
 
 }  // namespace lobe

@@ -34,6 +34,22 @@ std::string pngThatClaims(std::uint32_t width, std::uint32_t height) {
   return bytes;
 }
 
+std::string jpegSegment(char marker, const std::string& content) {
+  const std::size_t length = content.size() + 2;
+  return std::string("\xff") + marker + static_cast<char>(length / 256) + static_cast<char>(length % 256) + content;
+}
+
+/// A grey progressive JPEG of 8×8 pixels: a scan of the means, and scans that add nothing to them.
+std::string progressiveJpeg(int scans) {
+  const std::string oneCode = '\1' + std::string(15, '\0');
+  std::string bytes = "\xff\xd8" + jpegSegment('\xdb', '\0' + std::string(64, '\1')) +
+                      jpegSegment('\xc2', {"\x8\0\x8\0\x8\1\1\x11\0", 9}) + jpegSegment('\xc4', '\0' + oneCode + '\0') +
+                      jpegSegment('\xc4', '\x10' + oneCode + '\xe0') + jpegSegment('\xda', {"\1\1\0\0\0\0", 6}) +
+                      '\x7f';
+  for (int i = 0; i < scans; ++i) bytes += jpegSegment('\xda', {"\1\1\0\1\1\0", 6}) + std::string("\0\1", 2);
+  return bytes + "\xff\xd9";
+}
+
 Image readBytes(const std::string& name, const std::string& bytes) {
   const test::Folder folder;
   return readImage(folder.write(name, bytes));
@@ -48,6 +64,12 @@ TEST_CASE("render: a small PNG that claims a large size is rejected") {
   CHECK_THROWS_WITH(readBytes("a.png", pngThatClaims(16000, 16000)),
                     Contains("a.png: its size of 16000x16000 pixels is over the limit of 2^27 pixels"));
   CHECK_THROWS_WITH(readBytes("a.png", pngThatClaims(0xffffffff, 0xffffffff)), Contains("a.png: "));
+}
+
+TEST_CASE("render: a JPEG with more than 500 scans is rejected") {
+  CHECK(readBytes("a.jpg", progressiveJpeg(10)).width == 8);
+  CHECK_THROWS_WITH(readBytes("a.jpg", progressiveJpeg(600)),
+                    Contains("a.jpg: damaged image (Progressive JPEG image has more than 500 scans"));
 }
 
 TEST_CASE("render: empty images are rejected") {
