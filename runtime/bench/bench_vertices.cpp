@@ -23,6 +23,7 @@
 #include "runtime/guiding/field_data.h"
 #include "runtime/render/training/visible_region.h"
 #include "runtime/tools/json_text.h"
+#include "runtime/tools/option_names.h"
 
 namespace {
 
@@ -369,7 +370,7 @@ void declare(CLI::App& app, Options& o) {
       ->capture_default_str();
   app.add_option("--reductions", o.reductions, "Thresholds on the cost of merging Gaussians, separated by commas")
       ->delimiter(',')
-      ->check(CLI::NonNegativeNumber)
+      ->check(fromTo(0, 1e6))
       ->capture_default_str();
 }
 

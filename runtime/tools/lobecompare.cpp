@@ -20,6 +20,7 @@
 #include "runtime/image/pair_variance.h"
 #include "runtime/tools/exr_options.h"
 #include "runtime/tools/json_text.h"
+#include "runtime/tools/option_names.h"
 #include "runtime/tools/tool.h"
 
 namespace {
@@ -90,7 +91,7 @@ void declare(CLI::App& app, Arguments& arguments) {
                            "of comparing them");
   png->excludes(json)->excludes(map)->excludes(shrink)->excludes(merge)->excludes(agreement)->excludes(pair);
   app.add_option("--exposure", arguments.exposure, "Multiply the image by 2 to this power for --png")
-      ->check(CLI::Range(-100.0f, 100.0f))
+      ->check(lobe::fromTo(-100, 100))
       ->type_name("STOPS")
       ->needs(png);
 }

@@ -1,13 +1,16 @@
 #pragma once
-// Options of the tools whose value is one of several names.
+// Options of the tools whose value is one of several names, or a number in a range.
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
+
+#include "runtime/core/numbers.h"
 
 namespace lobe {
 
@@ -28,6 +31,16 @@ CLI::Validator oneOf(const Names& names) {
     return std::string();
   };
   return {replace, fmt::format("{{{}}}", fmt::join(all, ","))};
+}
+
+/// A validator of CLI11 that accepts numbers from least to most. Unlike CLI::Range, it refuses NaN.
+inline CLI::Validator fromTo(double least, double most) {
+  const auto check = [least, most](const std::string& text) {
+    const std::optional<double> value = parseReal(text);
+    if (value && *value >= least && *value <= most) return std::string();
+    return fmt::format("must be a number from {:g} to {:g}, not '{}'", least, most, text);
+  };
+  return {check, fmt::format("FLOAT in [{:g} - {:g}]", least, most)};
 }
 
 }  // namespace lobe

@@ -143,6 +143,9 @@ TEST_CASE("render: lobecompare --png writes the picture as loberender does") {
     CHECK_THAT(fault("--png " + (folder / "c.exr").string() + " " + output, 1), Catch::Contains("c.exr: no such file"));
     CHECK_THAT(fault("--png " + input + " /nowhere/a.png", 1), Catch::Contains("/nowhere/a.png"));
     CHECK(fault("--png --json " + input + " " + output, 2).find("--json") != std::string::npos);
+    for (const std::string exposure : {"nan", "101", "inf", "1x"})
+      CHECK_THAT(fault("--png " + input + " " + output + " --exposure " + exposure, 2),
+                 Catch::Contains("--exposure: must be a number from -100 to 100, not '" + exposure + "'"));
     CHECK_THAT(fault("--exposure 1 " + input + " " + input, 2), Catch::Contains("--png"));
     CHECK_THAT(fault("--exr-type half " + input + " " + input, 2), Catch::Contains("--merge"));
     CHECK(folder.files() == 3);
