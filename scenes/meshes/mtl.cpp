@@ -62,8 +62,7 @@ class MtlParser {
   float readNumber(std::string_view rest) const {
     const std::string_view word = takeWord(rest);
     const std::optional<double> number = parseReal(word);
-    if (!number)
-      throw std::runtime_error(lines_.describe(lines_.position(), fmt::format("\"{}\" is not a number", word)));
+    if (!number) throw std::runtime_error(lines_.describe(fmt::format("\"{}\" is not a number", word)));
     return static_cast<float>(*number);
   }
 
@@ -82,7 +81,7 @@ class MtlParser {
   /// File names may contain blanks; options before the name shift or scale the image.
   std::string readFile(std::string_view rest, MtlMaterial& material) const {
     if (!rest.starts_with('-')) return std::string(rest);
-    material.faults.push_back(lines_.describe(lines_.position(), "the options of the image are ignored"));
+    material.faults.push_back(lines_.describe("the options of the image are ignored"));
     return std::string(rest.substr(rest.find_last_of(" \t") + 1));
   }
 

@@ -24,12 +24,14 @@ ObjLines::ObjLines(std::string_view text) : text_(text) {
 std::optional<std::string_view> ObjLines::next() {
   if (begin_ >= text_.size()) return std::nullopt;
   position_ = begin_;
+  number_ = nextNumber_++;
   std::string_view line = takePhysical(begin_);
   if (!line.ends_with('\\')) return line;
   joined_.clear();
   while (line.ends_with('\\')) {
     joined_.append(line.substr(0, line.size() - 1)) += ' ';
     line = takePhysical(begin_);
+    ++nextNumber_;
   }
   return joined_ += line;
 }
@@ -46,6 +48,10 @@ std::string ObjLines::describe(std::size_t position, std::string_view message) c
   std::size_t number = 1;
   for (std::size_t i = 0; i < position; ++i)
     if (text_[i] == '\n' || (text_[i] == '\r' && text_.substr(i + 1, 1) != "\n")) ++number;
+  return describe(number, position, message);
+}
+
+std::string ObjLines::describe(std::size_t number, std::size_t position, std::string_view message) const {
   constexpr std::size_t kLongest = 60;
   const std::string_view line = takePhysical(position);
   std::string shown(line.substr(0, kLongest));

@@ -19,16 +19,20 @@ class ObjLines {
   /// Offset of the line that next() returned last.
   std::size_t position() const { return position_; }
 
-  /// "line N: message: "TEXT"" for the line that begins at a position; a long line is shortened.
+  /// "line N: message: "TEXT"" for the line that next() returned last; a long line is shortened.
+  std::string describe(std::string_view message) const { return describe(number_, position_, message); }
+  /// The same for the line that begins at a position. Counts the lines before it.
   std::string describe(std::size_t position, std::string_view message) const;
 
  private:
+  std::string describe(std::size_t number, std::size_t position, std::string_view message) const;
   /// The physical line at begin, which is moved to the next line.
   std::string_view takePhysical(std::size_t& begin) const;
 
   std::string_view text_;
   std::string joined_;
   std::size_t begin_ = 0, position_ = 0;
+  std::size_t number_ = 0, nextNumber_ = 1;  // of the lines at position_ and at begin_
 };
 
 /// Removes the next word from the line and returns it; empty at the end of the line.

@@ -11,6 +11,7 @@
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
 
+#include "scenes/meshes/mtl.h"
 #include "scenes/meshes/obj.h"
 #include "tests/support/meshes_test_tools.h"
 #include "tests/support/tool_run.h"
@@ -212,6 +213,19 @@ TEST_CASE("scenes: an OBJ is split into many materials in linear time") {
   CHECK(areaOf(meshes[kMaterials - 1]) == Approx(1));
   CHECK(meshes[kMaterials].triangles.empty());
   CHECK(areaOf(meshes.back()) == Approx(0.5));
+}
+
+TEST_CASE("scenes: faults of a material library name their line") {
+  const auto faults = [](const std::string& text) { return parseMtl(text).front().faults; };
+  CHECK(faults("\r\nnewmtl a\r\nbump \\\n-s 2 b.png\rbump -o c.png\n") ==
+        std::vector<std::string>{"line 3: the options of the image are ignored: \"bump \\\"",
+                                 "line 5: the options of the image are ignored: \"bump -o c.png\""});
+  CHECK_THROWS_WITH(parseMtl("newmtl a\n\nKd x\n"), "line 3: \"x\" is not a number: \"Kd x\"");
+  // Counting the lines before each fault would take far longer than the time limit of a test.
+  constexpr int kFaults = kSanitized ? 100000 : 500000;
+  std::string text = "newmtl a\n";
+  for (int i = 0; i < kFaults; ++i) text += "bump - b\n";
+  CHECK(faults(text).size() == kFaults);
 }
 
 TEST_CASE("scenes: the meshes of an OBJ are numbered as in Mitsuba 0.6") {
