@@ -80,7 +80,8 @@ std::vector<Vec3> smoothNormals(const TriangleMesh& mesh) {
 
 /// Splits vertices between triangles whose normals differ by the angle or more. As in Mitsuba 0.6, vertices with equal
 /// positions and texture coordinates are treated as one, whatever their indices, and the triangles around a vertex are
-/// grouped greedily: the first remaining one takes all whose normals are close to its own.
+/// grouped greedily: the first remaining one takes all whose normals are close to its own. Throws std::runtime_error
+/// that names the limit if that takes too many comparisons.
 class SmoothingSplitter {
  public:
   SmoothingSplitter(const TriangleMesh& mesh, float degrees)
@@ -119,6 +120,7 @@ class SmoothingSplitter {
   /// corners: those of equal vertices. The remaining corners keep their order.
   void splitVertex(std::span<std::size_t> corners) {
     while (!corners.empty()) {
+      countComparisons(corners.size());
       const std::size_t first = corners.front();
       const auto vertex = addVertex(vertexOf(first));
       const auto rest = std::stable_partition(corners.begin(), corners.end(),
@@ -127,6 +129,19 @@ class SmoothingSplitter {
                     [&](std::size_t corner) { result_.triangles[corner / 3][corner % 3] = vertex; });
       corners = {rest, corners.end()};
     }
+  }
+
+  /// The limit makes the time linear. A regular mesh takes up to four for each corner, a cone with a thousand sides
+  /// 170.
+  void countComparisons(std::size_t count) {
+    constexpr std::size_t kMostPerCorner = 1000;
+    const std::size_t corners = 3 * mesh_.triangles.size();
+    comparisons_ += count;
+    if (comparisons_ > kMostPerCorner * corners)
+      throw std::runtime_error(
+          fmt::format("the triangles around its vertices have so many normals that maxSmoothAngle takes more than {} "
+                      "comparisons for each of its {} corners",
+                      kMostPerCorner, corners));
   }
 
   std::uint32_t addVertex(std::uint32_t from) {
@@ -138,6 +153,7 @@ class SmoothingSplitter {
   const TriangleMesh& mesh_;
   std::vector<Eigen::Vector3d> normals_;
   double threshold_;
+  std::size_t comparisons_ = 0;
   TriangleMesh result_;
 };
 

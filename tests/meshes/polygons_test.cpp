@@ -247,6 +247,21 @@ TEST_CASE("scenes: maxSmoothAngle compares positions instead of indices and igno
   CHECK(largestTurn(readObj(path, stretched)) == Approx(0).margin(1e-3));
 }
 
+TEST_CASE("scenes: maxSmoothAngle takes a limited number of comparisons") {
+  const Folder folder;
+  const auto read = [&](int sides) {
+    std::string cone = "v 0 0 1\n";
+    for (int i = 0; i < sides; ++i) {
+      const double angle = 2 * std::numbers::pi * i / sides;
+      cone += fmt::format("v {} {} 0\nf 1 {} {}\n", std::cos(angle), std::sin(angle), i + 2, (i + 1) % sides + 2);
+    }
+    return readObj(folder.write("cone.obj", cone), smoothUpTo(0));
+  };
+  CHECK(read(4000).positions.size() == 3 * 4000);
+  CHECK_THAT(faultOfReading([&] { read(9000); }),
+             Contains("cone.obj: ") && Contains("more than 1000 comparisons for each of its 27000 corners"));
+}
+
 TEST_CASE("scenes: the normals of an OBJ are smooth within its groups as in Mitsuba") {
   const Folder folder;
   const std::filesystem::path path = folder.write("a.obj", hinge(40) + "g a\nf 1 2 3 4\ng b\nf 5 1 4 6\n");
