@@ -1,6 +1,8 @@
 #include "runtime/image/image_limits.h"
 
+#include <algorithm>
 #include <stdexcept>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -21,6 +23,28 @@ void checkImageSize(const std::filesystem::path& path, std::int64_t width, std::
   if (width * height > kHarmlessPixels && static_cast<std::uintmax_t>(width * height) / mostPerByte > bytes)
     throw std::runtime_error(
         fmt::format("{}: a file of {} bytes cannot contain {}x{} pixels", path.string(), bytes, width, height));
+}
+
+void PixelBudget::addFile(const std::filesystem::path& path) {
+  if (!files_.insert(path).second) return;
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (!error) bytes_ += size;
+}
+
+void PixelBudget::addImage(std::uintmax_t pixels) {
+  pixels_ += pixels;
+  if (isExceeded()) throw std::runtime_error(fault());
+}
+
+std::string PixelBudget::fault() const {
+  return fmt::format("the images of the scene have more than {} pixels together, the limit for {} bytes of image files",
+                     limit(), bytes_);
+}
+
+std::uintmax_t PixelBudget::limit() const {
+  constexpr std::uintmax_t kHarmless = std::uintmax_t{1} << 27, kPerByte = 500;
+  return std::max(kHarmless, kPerByte * bytes_);
 }
 
 }  // namespace lobe

@@ -62,6 +62,21 @@ Encoding encodingOf(const ReadContext& context, const Parameters& parameters) {
   return {Encoding::Kind::gamma, static_cast<float>(gamma)};
 }
 
+/// The image, or a grey one of the selected channel. For alpha, the image has been read from the alpha channel.
+std::shared_ptr<const Image> chosenChannel(const std::string& channel, std::shared_ptr<const Image> image) {
+  constexpr std::string_view kChannels = "rgb";
+  if (channel.empty() || channel == "a") return image;
+  const std::size_t index = channel.size() == 1 ? kChannels.find(channel) : std::string_view::npos;
+  if (index == std::string_view::npos && channel != "y")
+    throw ParameterError("channel", fmt::format("unknown channel \"{}\"; known are r, g, b, a, y", channel));
+  if (channel == "y" && !std::ranges::all_of(image->pixels, [](const Rgb& p) { return (p == p.x()).all(); }))
+    throw ParameterError("channel", "only grey images have a channel y; this one has r, g, b");
+  if (channel == "y") return image;
+  auto chosen = std::make_shared<Image>(*image);
+  for (Rgb& pixel : chosen->pixels) pixel = grey(pixel[static_cast<Eigen::Index>(index)]);
+  return chosen;
+}
+
 }  // namespace
 
 ImageRequest imageRequest(const ReadContext& context, const Parameters& parameters) {
@@ -99,9 +114,15 @@ ImageStore::ImageStore(const ReadContext& context) {
   collect(context, context.file.scene(), false, requests);
   std::vector<std::pair<ImageRequest, Entry*>> reads;
   for (const ImageRequest& request : requests)
-    if (const auto [entry, isNew] = entries_.try_emplace(keyOf(request)); isNew)
+    if (const auto [entry, isNew] = entries_.try_emplace(keyOf(request)); isNew) {
       reads.emplace_back(request, &entry->second);
+      budget_.addFile(request.path);
+    }
   parallelFor(std::size_t{0}, reads.size(), [&](std::size_t i) { *reads[i].second = read(reads[i].first); });
+  if (!budget_.isExceeded()) return;
+  // Which images are within the limit depends on the order in which the threads have read them.
+  for (const auto& [request, entry] : reads)
+    if (entry->image) *entry = {nullptr, budget_.fault()};
 }
 
 ImageStore::Key ImageStore::keyOf(const ImageRequest& request) {
@@ -111,6 +132,7 @@ ImageStore::Key ImageStore::keyOf(const ImageRequest& request) {
 ImageStore::Entry ImageStore::read(const ImageRequest& request) {
   try {
     Image image = request.alpha ? readAlpha(request.path) : readImage(request.path, request.encoding);
+    budget_.addImage(image.pixels.size());
     return {std::make_shared<const Image>(std::move(image)), ""};
   } catch (const std::bad_alloc&) {
     throw;  // no fault of the file, so lenient reading must not go on without it
@@ -122,13 +144,32 @@ ImageStore::Entry ImageStore::read(const ImageRequest& request) {
 std::shared_ptr<const Image> ImageStore::get(ReadContext& context, pugi::xml_node node, const Parameters& parameters,
                                              const ImageRequest& request, const std::string& remedy) {
   const auto [entry, isNew] = entries_.try_emplace(keyOf(request));
-  if (isNew) entry->second = read(request);
+  if (isNew) {
+    budget_.addFile(request.path);
+    entry->second = read(request);
+  }
   if (entry->second.image) return entry->second.image;
   const std::ptrdiff_t location = parameters.location("filename");
   const std::string message = fmt::format("{}: {}", describe(node), entry->second.fault);
   if (std::filesystem::exists(request.path)) context.file.fail(location, message);
   context.unsupported(location, "missing image " + request.path.string(), message, remedy);
   return nullptr;
+}
+
+std::shared_ptr<const Image> ImageStore::prepared(ReadContext& context, pugi::xml_node node,
+                                                  const Parameters& parameters, const ImageRequest& request,
+                                                  const std::shared_ptr<const Image>& image, Sign sign) {
+  const std::string channel = channelOf(parameters);
+  std::tuple key(image.get(), channel, sign);
+  if (const auto known = prepared_.find(key); known != prepared_.end()) return known->second;
+  const std::shared_ptr<const Image> result =
+      chosenChannel(channel, withoutFaults(context, node, request, image, sign));
+  try {
+    if (result != image) budget_.addImage(result->pixels.size());
+  } catch (const std::runtime_error& error) {
+    context.file.fail(parameters.location("filename"), fmt::format("{}: {}", describe(node), error.what()));
+  }
+  return prepared_.emplace(std::move(key), result).first->second;
 }
 
 }  // namespace lobe

@@ -10,6 +10,7 @@
 
 #include "materials/parameters.h"
 #include "runtime/image/image.h"
+#include "runtime/image/image_limits.h"
 #include "scenes/mitsuba/read_context.h"
 
 namespace lobe {
@@ -39,6 +40,7 @@ enum class Sign { positive, any };
 std::shared_ptr<const Image> withoutFaults(ReadContext& context, pugi::xml_node node, const ImageRequest& request,
                                            std::shared_ptr<const Image> image, Sign sign);
 
+/// The number of pixels of all its images is limited.
 class ImageStore {
  public:
   /// Reads the images of all the file's bitmaps (and environment maps, if geometry is read) in parallel. Errors are
@@ -49,6 +51,12 @@ class ImageStore {
   /// SceneError at the filename parameter when it cannot be read.
   std::shared_ptr<const Image> get(ReadContext& context, pugi::xml_node node, const Parameters& parameters,
                                    const ImageRequest& request, const std::string& remedy);
+  /// An image made from one that get() has returned: with black in place of faulty pixels (withoutFaults), and grey if
+  /// a channel is selected. Elements that need the same image share it. Throws SceneError like get(), and
+  /// ParameterError if there is no such channel.
+  std::shared_ptr<const Image> prepared(ReadContext& context, pugi::xml_node node, const Parameters& parameters,
+                                        const ImageRequest& request, const std::shared_ptr<const Image>& image,
+                                        Sign sign);
 
  private:
   using Key = std::tuple<std::filesystem::path, Encoding::Kind, float, bool>;
@@ -57,9 +65,12 @@ class ImageStore {
     std::string fault;
   };
   static Key keyOf(const ImageRequest& request);
-  static Entry read(const ImageRequest& request);
+  Entry read(const ImageRequest& request);
 
   std::map<Key, Entry> entries_;
+  std::map<std::tuple<const Image*, std::string, Sign>, std::shared_ptr<const Image>>
+      prepared_;  // by image and channel
+  PixelBudget budget_;
 };
 
 }  // namespace lobe

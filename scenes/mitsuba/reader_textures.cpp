@@ -68,21 +68,6 @@ BitmapOptions readBitmapOptions(const Parameters& parameters) {
   return options;
 }
 
-/// The image, or a grey one of the selected channel. For alpha, the image has been read from the alpha channel.
-std::shared_ptr<const Image> chosenChannel(const std::string& channel, std::shared_ptr<const Image> image) {
-  constexpr std::string_view kChannels = "rgb";
-  if (channel.empty() || channel == "a") return image;
-  const std::size_t index = channel.size() == 1 ? kChannels.find(channel) : std::string_view::npos;
-  if (index == std::string_view::npos && channel != "y")
-    throw ParameterError("channel", fmt::format("unknown channel \"{}\"; known are r, g, b, a, y", channel));
-  if (channel == "y" && !std::ranges::all_of(image->pixels, [](const Rgb& p) { return (p == p.x()).all(); }))
-    throw ParameterError("channel", "only grey images have a channel y; this one has r, g, b");
-  auto chosen = std::make_shared<Image>(*image);
-  if (index != std::string_view::npos)
-    for (Rgb& pixel : chosen->pixels) pixel = grey(pixel[static_cast<Eigen::Index>(index)]);
-  return chosen;
-}
-
 TexturePtr makeCheckerboardFrom(const ReadContext& context, const Parameters& parameters) {
   const NumberSquares numbers = context.file.isOfToday() ? NumberSquares::exchanged : NumberSquares::asColours;
   return makeCheckerboard(parameters.texture("color0", grey(0.4f)), parameters.texture("color1", grey(0.2f)),
@@ -162,11 +147,10 @@ TexturePtr TextureReader::makeOf(pugi::xml_node node, Encoded encoded) {
 TexturePtr TextureReader::makeFromBitmap(pugi::xml_node node, const Parameters& parameters, Encoded encoded) {
   const BitmapOptions options = readBitmapOptions(parameters);
   const ImageRequest request = bitmapRequest(context_, parameters);
-  std::shared_ptr<const Image> image = images_.get(context_, node, parameters, request, "grey is used");
+  const std::shared_ptr<const Image> image = images_.get(context_, node, parameters, request, "grey is used");
   if (!image) return constantTexture(grey(kFallbackGrey));
   const Sign sign = encoded == Encoded::asGiven ? Sign::positive : Sign::any;
-  image = withoutFaults(context_, node, request, std::move(image), sign);
-  return makeBitmap(chosenChannel(channelOf(parameters), std::move(image)), options);
+  return makeBitmap(images_.prepared(context_, node, parameters, request, image, sign), options);
 }
 
 }  // namespace lobe

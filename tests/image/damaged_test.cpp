@@ -6,6 +6,7 @@
 #include <zlib.h>
 #include <catch2/catch.hpp>
 
+#include "runtime/image/image_limits.h"
 #include "runtime/image/image_output.h"
 #include "tests/support/picture_files.h"
 #include "tests/support/tool_run.h"
@@ -70,6 +71,23 @@ TEST_CASE("render: a JPEG with more than 500 scans is rejected") {
   CHECK(readBytes("a.jpg", progressiveJpeg(10)).width == 8);
   CHECK_THROWS_WITH(readBytes("a.jpg", progressiveJpeg(600)),
                     Contains("a.jpg: damaged image (Progressive JPEG image has more than 500 scans"));
+}
+
+TEST_CASE("render: the pixels of all images of a scene are limited") {
+  constexpr std::uintmax_t kLimit = 134217728;
+  const test::Folder folder;
+  PixelBudget budget;
+  budget.addFile(folder / "none.png");
+  for (int i = 0; i < 2; ++i) budget.addFile(folder.write("a.png", std::string(200000, 'a')));
+  budget.addImage(kLimit);
+  CHECK(!budget.isExceeded());
+  CHECK_THROWS_WITH(budget.addImage(1),
+                    "the images of the scene have more than 134217728 pixels together, the limit for "
+                    "200000 bytes of image files");
+  CHECK(budget.isExceeded());
+  budget.addFile(folder.write("b.png", std::string(100000, 'b')));
+  CHECK_NOTHROW(budget.addImage(300000 * 500 - kLimit - 1));
+  CHECK_THROWS_WITH(budget.addImage(1), Contains("more than 150000000 pixels together"));
 }
 
 TEST_CASE("render: empty images are rejected") {

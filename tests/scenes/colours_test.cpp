@@ -1,6 +1,10 @@
 // Values of colours, spectra, textures and lights in scene files of both dialects.
 
+#include <cstdint>
 #include <numbers>
+#include <string>
+
+#include <sys/resource.h>
 
 #include <catch2/catch.hpp>
 
@@ -37,6 +41,26 @@ void checkNear(const Rgb& value, const Rgb& expected, float tolerance = 1e-3f) {
 /// A row of two pixels.
 std::string blackAndWhite() {
   return rowPng(std::string("\0\0\0\xff\xff\xff", 6), 3);
+}
+
+/// A grey PNG of this width and height.
+std::string squarePng(std::uint32_t size) {
+  std::string rows;
+  for (std::uint32_t y = 0; y < size; ++y) rows += '\0' + std::string(size, '\x80');
+  return pngFile({size, size, 8, PngColours::grey}, deflated(rows));
+}
+
+std::string sphereWithBitmap(const std::string& parameters) {
+  return "<shape type=\"sphere\"><bsdf type=\"diffuse\"><texture name=\"reflectance\" type=\"bitmap\">"
+         "<string name=\"filename\" value=\"a.png\"/>" +
+         parameters + "</texture></bsdf></shape>\n";
+}
+
+/// The most memory that this process has had, in bytes.
+long peakMemory() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return 1024 * usage.ru_maxrss;
 }
 
 const Rgb kEqualEnergy(1.205f, 0.948f, 0.909f);
@@ -248,6 +272,27 @@ TEST_CASE("scenes: bitmaps are read by channel") {
   folder.write("b.png", blackAndWhite());
   CHECK_THROWS_WITH(value("a", "b.png"), Catch::Contains("b.png: it has no alpha channel"));
   checkNear(value("y", "b.png"), grey(0.5f));
+}
+
+TEST_CASE("scenes: textures of the same channel of an image share it") {
+  const TestFolder folder;
+  folder.write("a.png", squarePng(1024));
+  std::string body;
+  for (int i = 0; i < 60; ++i) body += sphereWithBitmap("<string name=\"channel\" value=\"r\"/>");
+  const std::filesystem::path file = folder.write("a.xml", sceneOf(body));
+  const long before = peakMemory();
+  const Scene scene = readScene(file);
+  CHECK(peakMemory() - before < 300'000'000);  // a copy for each of them would be over 700 MB
+}
+
+TEST_CASE("scenes: the images of a scene have a limited number of pixels", "[slow]") {
+  const TestFolder folder;
+  folder.write("a.png", squarePng(4096));
+  std::string body;
+  for (int i = 1; i <= 9; ++i)
+    body += sphereWithBitmap("<float name=\"gamma\" value=\"1." + std::to_string(i) + "\"/>");
+  CHECK_THROWS_WITH(readScene(folder.write("a.xml", sceneOf(body))),
+                    Catch::Contains("the images of the scene have more than 134217728 pixels together"));
 }
 
 TEST_CASE("scenes: the gamma of a PNG file is used in files for Mitsuba 0.6") {
