@@ -106,8 +106,10 @@ Tensor<T> TensorFile::tensor(const Field& field) const {
 
 Tensor<float> TensorFile::floats(const std::string& name, std::size_t dimensions) const {
   Tensor<float> result = tensor<float>(field(name, Type::float32, dimensions));
-  if (!std::ranges::all_of(result.values, [](float x) { return std::isfinite(x); }))
-    fail(name, "contains numbers that are not finite");
+  // Products of some values must be finite. The negation also finds NaN.
+  constexpr float kLargest = 1e9f;
+  if (!std::ranges::all_of(result.values, [](float x) { return std::abs(x) <= kLargest; }))
+    fail(name, fmt::format("contains numbers that are not finite or over {:g}", kLargest));
   return result;
 }
 

@@ -34,7 +34,7 @@ class TensorFile {
 
   bool has(const std::string& name) const { return fields_.contains(name); }
   /// The field, which must have elements of this type and the given number of dimensions, must not be empty and must
-  /// contain only finite numbers.
+  /// contain only finite numbers of up to 1e9.
   Tensor<float> floats(const std::string& name, std::size_t dimensions) const;
   Tensor<std::uint8_t> bytes(const std::string& name, std::size_t dimensions) const;
 

@@ -144,7 +144,9 @@ class TableReader {
     if (file_.bytes("jacobian", 1).values.front() != 0) {
       tables.normals = clamped(plane("ndf", tables.normalSize));
       tables.areas = plane("sigma", tables.areaSize);
-      if (std::ranges::min(tables.areas) <= 0.0f) file_.fail("sigma", "contains areas that are not positive");
+      constexpr float kLeastArea = 1e-9f;
+      if (std::ranges::min(tables.areas) < kLeastArea)
+        file_.fail("sigma", fmt::format("contains areas that are not positive or below {:g}", kLeastArea));
     }
     return tables;
   }

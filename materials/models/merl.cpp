@@ -159,16 +159,17 @@ class MerlLobe final : public MeasuredLobe {
 };
 
 /// Converts the values of a file. Negative ones, which mean "not measured", become 0. Throws std::runtime_error if a
-/// number is not finite.
+/// number is not finite or so large that products would not be.
 std::vector<Eigen::Array3f> tableFrom(const std::string& path, const char* planes) {
+  constexpr float kLargest = 1e30f;
   std::vector<Eigen::Array3f> values(kBins);
   for (std::size_t channel = 0; channel < 3; ++channel)
     for (std::size_t i = 0; i < kBins; ++i) {
       double value;
       std::memcpy(&value, planes + (channel * kBins + i) * sizeof(double), sizeof(double));
       const auto scaled = static_cast<float>(std::max(value, 0.0) * kScales[channel]);
-      if (!std::isfinite(value) || !std::isfinite(scaled))
-        throw std::runtime_error(fmt::format("{}: contains numbers that are not finite", path));
+      if (!std::isfinite(value) || !(scaled <= kLargest))
+        throw std::runtime_error(fmt::format("{}: contains numbers that are not finite or over {:g}", path, kLargest));
       values[i][static_cast<Eigen::Index>(channel)] = scaled;
     }
   return values;

@@ -144,6 +144,8 @@ TEST_CASE("materials: measured files with inconsistent fields are rejected with 
   CHECK_THAT(fault(floatField("ndf", {1, 2}, {1, 1})), Contains("\"ndf\"") && Contains("2×2"));
   CHECK_THAT(fault(floatField("ndf", {2, 2}, {1, 1, 1, std::numeric_limits<float>::quiet_NaN()})),
              Contains("\"ndf\"") && Contains("not finite"));
+  CHECK_THAT(fault(floatField("ndf", {2, 2}, {1, 1, 1, 2e9f})), Contains("\"ndf\"") && Contains("over 1e+09"));
+  CHECK_THAT(fault(floatField("sigma", {2, 2}, {1, 1, 1e-30f, 1})), Contains("\"sigma\"") && Contains("below 1e-09"));
   CHECK_THAT(fault(floatField("rgb", {1, 19, 2, 2, 2}, std::vector<float>(152))), Contains("2 colours"));
   std::vector<TestField> spectral = without(whole, "rgb");
   spectral.push_back(floatField("spectra", {1}, {1}));
@@ -261,6 +263,8 @@ TEST_CASE("materials: invalid MERL files are rejected and unmeasured values are 
   CHECK_THAT(faultOfFile("merl", ""), Contains("not a MERL file"));
   CHECK_THAT(faultOfFile("merl", bytesOf(std::vector<std::int32_t>{90, -90, 180})), Contains("90×-90×180"));
   CHECK_THAT(faultOfFile("merl", bytesOf(std::vector<std::int32_t>{90, 90, 180, 1})), Contains("16"));
+  CHECK_THAT(faultOfFile("merl", merlFile([](const auto&, const auto&) { return grey(1e31f); })),
+             Contains("not finite or over 1e+30"));
   const std::string unmeasured = merlFile([](const auto&, const auto&) { return grey(-1.0f); });
   const test::Folder folder;
   const BsdfPtr black = bsdfOfFile("merl", write(folder, "m", unmeasured));
