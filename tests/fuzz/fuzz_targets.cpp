@@ -13,8 +13,10 @@
 #include <vector>
 
 #include "lobe/field.h"
+#include "runtime/image/aov.h"
 #include "runtime/image/image.h"
 #include "runtime/image/image_output.h"
+#include "runtime/image/merge.h"
 #include "scenes/meshes/mtl.h"
 #include "scenes/meshes/obj.h"
 #include "scenes/meshes/ply.h"
@@ -73,12 +75,49 @@ void readCheckpoint(const fs::path& path) {
   if (!file.illumination().empty()) IlluminationFile::parse(file.illumination(), path);
 }
 
-/// Reads a measured material of a scene, as users do.
+/// A reader that may refuse the file while others read it.
+template <class Read>
+void attempt(const Read& read) {
+  try {
+    read();
+  } catch (const std::runtime_error&) {  // refused
+  }
+}
+
+/// Reads files by a scene that names them, as users do.
+Scene readByScene(const std::string& version, const std::string& body) {
+  const fs::path path = folder() / "scene.xml";
+  std::ofstream(path) << "<scene version=\"" << version << "\"><sensor type=\"perspective\"/>" << body << "</scene>";
+  return readScene(path);
+}
+
 void readMeasured(const std::string& type, const fs::path& path) {
-  std::ofstream(folder() / "scene.xml")
-      << "<scene version=\"3.0.0\"><sensor type=\"perspective\"/><shape type=\"sphere\"><bsdf type=\"" << type
-      << "\"><string name=\"filename\" value=\"" << path.filename().string() << "\"/></bsdf></shape></scene>";
-  readScene(folder() / "scene.xml");
+  checkSamplingOfMaterials(readByScene("3.0.0", "<shape type=\"sphere\"><bsdf type=\"" + type +
+                                                    "\"><string name=\"filename\" value=\"" + path.filename().string() +
+                                                    "\"/></bsdf></shape>"));
+}
+
+void readSpectrum(const fs::path& path) {
+  const auto spectrum = [&](const std::string& name) {
+    return "<spectrum name=\"" + name + "\" filename=\"" + path.filename().string() + "\"/>";
+  };
+  readByScene("3.0.0", "<shape type=\"sphere\"><bsdf type=\"diffuse\">" + spectrum("reflectance") +
+                           "</bsdf></shape><emitter type=\"constant\">" + spectrum("radiance") + "</emitter>");
+}
+
+/// An OBJ file, and its material library from the first "newmtl" on.
+void readObjWithMaterials(Bytes bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const std::size_t library = std::min(text.find("newmtl"), text.size());
+  inputFile("a.mtl", bytes.subspan(library));
+  inputFile("a.obj", bytes.first(library));
+  // Only version 0.6 reads libraries.
+  readByScene("0.6.0", "<shape type=\"obj\"><string name=\"filename\" value=\"a.obj\"/></shape>");
+}
+
+void readMeshes(const fs::path& path) {
+  attempt([&] { readSerialized(path, 0, {}); });
+  readSerialized(path, 1, {});
 }
 
 /// Fills a table of the standard size with copies of the values after the header, so that short inputs are read.
@@ -94,12 +133,13 @@ void readMerl(Bytes bytes) {
 }
 
 void readPicture(const fs::path& path) {
-  readImage(path);
-  try {
-    readAlpha(path);
-  } catch (const std::runtime_error&) {  // many formats have none
+  attempt([&] { readAlpha(path); });
+  if (path.extension() == ".exr") {
+    attempt([&] { readAovs(path); });
+    attempt([&] { sampleRanges(readAttributes(path)); });
+    attempt([&] { samplesOf(path); });
   }
-  if (path.extension() == ".exr") readAttributes(path);
+  readImage(path);
 }
 
 FuzzTargets makeTargets() {
@@ -116,8 +156,10 @@ FuzzTargets makeTargets() {
       {"obj", ofFile("a.obj", [](const fs::path& path) { readObj(path, {}); })},
       {"mtl",
        [](Bytes bytes) { parseMtl(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size())); }},
+      {"obj-mtl", readObjWithMaterials},
       {"ply", ofFile("a.ply", [](const fs::path& path) { readPly(path, {}); })},
-      {"serialized", ofFile("a.serialized", [](const fs::path& path) { readSerialized(path, 0, {}); })},
+      {"serialized", ofFile("a.serialized", readMeshes)},
+      {"spd", ofFile("a.spd", readSpectrum)},
       {"rgl", ofFile("a.bsdf", [](const fs::path& path) { readMeasured("measured", path); })},
       {"merl", readMerl}};
   for (const char* format : {"exr", "png", "jpg", "hdr", "bmp", "tga"})
@@ -133,10 +175,7 @@ const FuzzTargets& fuzzTargets() {
 }
 
 void readOrRefuse(const FuzzTarget& read, Bytes bytes) {
-  try {
-    read(bytes);
-  } catch (const std::runtime_error&) {  // refused
-  }
+  attempt([&] { read(bytes); });
 }
 
 }  // namespace lobe::fuzz

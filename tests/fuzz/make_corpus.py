@@ -69,12 +69,12 @@ end_header
 """
 
 
-def serialized():
-    """A Mitsuba file of one triangle in single precision."""
+def serialized(meshes):
+    """A Mitsuba file with so many equal triangles in single precision, each a mesh."""
     body = struct.pack("<I", 0x1000) + b"a\0" + struct.pack("<QQ", 3, 1)
     body += struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0) + struct.pack("<3I", 0, 1, 2)
     mesh = struct.pack("<HH", 0x041C, 4) + zlib.compress(body)
-    return mesh + struct.pack("<QI", 0, 1)
+    return meshes * mesh + struct.pack(f"<{meshes}QI", *(i * len(mesh) for i in range(meshes)), meshes)
 
 
 def tensor_file():
@@ -92,10 +92,10 @@ def tensor_file():
     return b"tensor_file\0" + bytes([1, 0]) + struct.pack("<I", len(fields)) + entries + data
 
 
-def exr(channels, compression, window=(0, 0, 2, 1), display=(0, 0, 2, 1), tiled=False):
+def exr(channels, compression, window=(0, 0, 2, 1), display=(0, 0, 2, 1), tiled=False, ranges=b""):
     """An OpenEXR file whose pixels are not compressed, which is valid for every method: it then saves nothing.
 
-    channels: pairs of name and pixel type (0: integers, 1: half, 2: float)."""
+    channels: pairs of name and pixel type (0: integers, 1: half, 2: float). ranges: of samples, as in merged pictures."""
 
     def attribute(name, kind, value):
         return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<I", len(value)) + value
@@ -106,6 +106,8 @@ def exr(channels, compression, window=(0, 0, 2, 1), display=(0, 0, 2, 1), tiled=
     header += attribute("lineOrder", "lineOrder", b"\0") + attribute("pixelAspectRatio", "float", struct.pack("<f", 1))
     header += attribute("screenWindowCenter", "v2f", struct.pack("<2f", 0, 0)) + attribute("screenWindowWidth", "float", struct.pack("<f", 1))
     header += attribute("renderer", "string", b"fuzz") + attribute("seed", "double", struct.pack("<d", 1))
+    if ranges:
+        header += attribute("samples", "double", struct.pack("<d", 8)) + attribute("sampleRanges", "string", ranges)
     if tiled:
         header += attribute("tiles", "tiledesc", struct.pack("<IIB", 4, 2, 0))
     width, height = window[2] - window[0] + 1, window[3] - window[1] + 1
@@ -127,6 +129,7 @@ def exr_files():
     files["integers"] = exr([("Y", 0)], 0)
     files["cropped"] = exr(rgb, 0, window=(1, -1, 3, 0), display=(0, 0, 4, 4))
     files["tiled"] = exr(rgb, 0, tiled=True)
+    files["merged"] = exr(rgb, 0, ranges=b"guided 1 0 4, path 1 8 12")
     return files
 
 
@@ -172,7 +175,8 @@ def made_by_tools(tools, work):
     scene.write_text(SCENE)
     run(tools / "lobefit", scene, "-o", work / "lobes")
     run(tools / "loberender", scene, "--cache", work / "lobes", "--integrator", "product", "--spp", "1", "--passes", "1", "--photons", "500",
-        "--importons", "500", "-o", work / "a.exr", "-o", work / "a.png", "--save-illumination", work / "a.illum", "--checkpoint", work / "a.ckpt")
+        "--importons", "500", "--aov", "all", "-o", work / "a.exr", "-o", work / "a.png", "--save-illumination", work / "a.illum",
+        "--checkpoint", work / "a.ckpt")
     caches = list((work / "lobes").glob("*.lobe"))
     return {"lobe": caches, "lobe-payload": caches, "illum": [work / "a.illum"], "illum-payload": [work / "a.illum"],
             "checkpoint": [work / "a.ckpt"], "checkpoint-payload": [work / "a.ckpt"], "exr": [work / "a.exr"], "png": [work / "a.png"],
@@ -181,12 +185,13 @@ def made_by_tools(tools, work):
 
 def main():
     tools, corpus = map(pathlib.Path, sys.argv[1:3])
-    inline = {"obj": OBJ.encode(), "mtl": MTL.encode(), "ply": PLY.encode(), "serialized": serialized(), "rgl": tensor_file(),
+    inline = {"obj": OBJ.encode(), "mtl": MTL.encode(), "obj-mtl": (OBJ + MTL).encode(), "ply": PLY.encode(), "serialized": serialized(1),
+              "spd": b"# nm\n400 0.2\n500.5 0.4\n700 0.1\n", "rgl": tensor_file(),
               "merl": struct.pack("<3i4d", 90, 90, 180, 0, 30, 500, -1), "tga": tga(), "bmp": bmp(), "hdr": hdr(), "jpg": jpeg()}
     for target, content in inline.items():
         (corpus / target).mkdir(parents=True, exist_ok=True)
         (corpus / target / "initial").write_bytes(content)
-    for target, files in {"exr": exr_files(), "png": png_files()}.items():
+    for target, files in {"exr": exr_files(), "png": png_files(), "serialized": {"two": serialized(2)}}.items():
         (corpus / target).mkdir(exist_ok=True)
         for name, content in files.items():
             (corpus / target / f"initial-{name}").write_bytes(content)

@@ -24,17 +24,33 @@ bool isDensity(float pdf) {
   return std::isfinite(pdf) && pdf >= 0;
 }
 
+constexpr int kSamples = 16;
+constexpr std::array<float, 5> kCosines{1.0f, 0.7f, 0.3f, 0.01f, -0.5f};
+
+/// The i-th of kSamples numbers in (0, 1).
+float numberOf(int i) {
+  return (static_cast<float>(i) + 0.5f) / kSamples;
+}
+
+/// A direction above the horizon for a number in (0, 1), and one with this cosine.
+Vec3 upward(float u) {
+  const float phi = 6.2831853f * u, r = std::sqrt(u);
+  return {r * std::cos(phi), r * std::sin(phi), std::sqrt(1 - u)};
+}
+Vec3 withCosine(float cosine) {
+  const float sine = std::sqrt(1 - cosine * cosine);
+  return {0.6f * sine, 0.8f * sine, cosine};
+}
+
 void checkSampling(const Field& field, const ShadingPoint& point, const SurfaceReflectance& reflectance,
                    const LobeCacheSet* caches) {
   SurfaceDistribution distribution(field, point);
   if (!distribution.hasRecord()) return;
   distribution.describe(reflectance, caches);
   require(distribution.bsdfProbability() > 0 && distribution.bsdfProbability() <= 1);
-  constexpr int kSamples = 16;
   for (int i = 0; i < kSamples; ++i) {
-    const float u = (static_cast<float>(i) + 0.5f) / kSamples;
-    const float phi = 6.2831853f * u, r = std::sqrt(u);
-    require(isDensity(distribution.guidedPdf({r * std::cos(phi), r * std::sin(phi), std::sqrt(1 - u)})));
+    const float u = numberOf(i);
+    require(isDensity(distribution.guidedPdf(toFloats(upward(u)))));
     float choice = u;
     const Strategy strategy = distribution.choose(choice);
     if (strategy == Strategy::bsdf) continue;
@@ -75,12 +91,10 @@ void checkSamplingOfLobe(const std::filesystem::path& path) {
   std::filesystem::remove(renamed);
   static const Field field = fixedField();
   const std::array<TintedLobe, 1> lobes{{{0, 0.8f}}};
-  for (const float cosine : {1.0f, 0.7f, 0.3f, 0.01f, -0.5f}) {
-    const float sine = std::sqrt(1 - cosine * cosine);
+  for (const float cosine : kCosines)
     for (const float diffuse : {0.0f, 0.3f})
-      checkSampling(field, {{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.6f * sine, 0.8f * sine, cosine}},
+      checkSampling(field, {{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, toFloats(withCosine(cosine))},
                     {lobes, diffuse, 0}, &caches);
-  }
 }
 
 void checkSamplingOfField(const Field& field) {
@@ -92,6 +106,21 @@ void checkSamplingOfField(const Field& field) {
                              toFloats(record.normal),   {0.6f, 0, 0.8f}};
     checkSampling(field, point, {{}, 0.5f, 0}, nullptr);
   }
+}
+
+void checkSamplingOfMaterials(const Scene& scene) {
+  const Vec2 uv(0.5f, 0.5f);
+  for (const Material& material : scene.materials)
+    for (const float cosine : kCosines)
+      for (int i = 0; i < kSamples; ++i) {
+        const float u = numberOf(i);
+        const Vec3 wo = withCosine(cosine);
+        require(isDensity(material.bsdf->pdf(wo, upward(u), uv)));
+        const auto sample = material.bsdf->sample(wo, uv, u, {u, std::fmod(7 * u, 1.0f)});
+        if (!sample) continue;
+        require(isDensity(sample->pdf));
+        require(std::abs(sample->wi.norm() - 1) < 1e-3f);
+      }
 }
 
 }  // namespace lobe::fuzz

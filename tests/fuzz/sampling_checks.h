@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "lobe/field.h"
+#include "scenes/scene.h"
 
 namespace lobe::fuzz {
 
@@ -14,5 +15,8 @@ void checkSamplingOfLobe(const std::filesystem::path& path);
 
 /// The same at some records of the field, for a diffuse surface.
 void checkSamplingOfField(const Field& field);
+
+/// Samples the smooth parts of all materials of the scene, with the same checks.
+void checkSamplingOfMaterials(const Scene& scene);
 
 }  // namespace lobe::fuzz
