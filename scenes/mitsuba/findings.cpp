@@ -12,6 +12,8 @@ namespace {
 constexpr std::size_t kMostLines = 10;
 /// Limit on kinds of faults: a file with more of them is probably not a scene.
 constexpr std::size_t kMostKinds = 10000;
+/// Limit on the bytes of a message, for which the longest message about a sound scene leaves much room.
+constexpr std::size_t kLongestMessage = 4000;
 
 std::string andMore(std::size_t count) {
   return count > 1 ? fmt::format(" ({} more of this kind)", count - 1) : "";
@@ -41,36 +43,55 @@ std::string describe(const std::vector<Fault>& faults) {
 
 }  // namespace
 
+std::string shortened(std::string_view text, std::size_t most) {
+  if (text.size() <= most) return std::string(text);
+  const auto continuesCharacter = [&](std::size_t i) { return (text[i] & 0xc0) == 0x80; };
+  while (most > 0 && continuesCharacter(most)) --most;
+  return std::string(text.substr(0, most)) + "...";
+}
+
 std::string Fault::text() const {
   const std::string hint = consequence.empty() ? "" : fmt::format(" (with --lenient, {})", consequence);
   return fmt::format("{}: {}{}{}", where, message, hint, andMore(count));
 }
 
 SceneError::SceneError(std::string where, std::string message)
-    : SceneError(std::vector{Fault{std::move(where), std::move(message), ""}}) {}
+    : SceneError(std::vector{Fault{std::move(where), shortened(message, kLongestMessage), ""}}) {}
 
 SceneError::SceneError(std::vector<Fault> all) : std::runtime_error(describe(all)), faults_(std::move(all)) {}
 
-void Findings::fault(std::string where, const std::string& kind, std::string message, std::string consequence) {
-  const auto [entry, isNew] = faultOfKind_.try_emplace(kind, faults_.size());
-  if (isNew && faults_.size() >= kMostKinds) throw SceneError(faults_);
+void Findings::fault(std::string where, const std::string& kind, const std::string& message,
+                     const std::string& consequence) {
+  std::string key = shortened(kind, kLongestMessage);
+  if (faults_.size() >= kMostKinds && !faultOfKind_.contains(key)) return leaveOut(std::move(where));
+  const auto [entry, isNew] = faultOfKind_.try_emplace(std::move(key), faults_.size());
   // Some elements are read twice, and report the same fault again.
   if (!places_.emplace(entry->second, where).second) return;
   if (isNew)
-    faults_.push_back({std::move(where), std::move(message), std::move(consequence)});
+    faults_.push_back({std::move(where), shortened(message, kLongestMessage), shortened(consequence, kLongestMessage)});
   else
     ++faults_[entry->second].count;
 }
 
+/// Lenient reading does not tolerate this, because it reports everything that it leaves out.
+void Findings::leaveOut(std::string where) {
+  if (faults_.size() > kMostKinds)
+    ++faults_.back().count;
+  else
+    faults_.push_back({std::move(where),
+                       fmt::format("at most {} kinds of faults are listed, and this is another one", kMostKinds), ""});
+}
+
 void Findings::warn(const std::string& where, const std::string& kind, const std::string& message) {
-  const auto [entry, isNew] = warningOfKind_.try_emplace(kind, warnings_.size());
-  if (isNew) warnings_.push_back({where, message, 0});
+  const auto [entry, isNew] = warningOfKind_.try_emplace(shortened(kind, kLongestMessage), warnings_.size());
+  if (isNew) warnings_.push_back({where, shortened(message, kLongestMessage), 0});
   Warning& warning = warnings_[entry->second];
   // An element that is read twice repeats its warnings.
   if (warning.count == 0 || warning.where != where) ++warning.count;
 }
 
 void Findings::note(std::string text) {
+  text = shortened(text, kLongestMessage);
   if (knownNotes_.insert(text).second) notes_.push_back(std::move(text));
 }
 

@@ -7,10 +7,15 @@
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 namespace lobe {
+
+/// The text or, if it has more than that many bytes, its beginning and "...". Names and values in a file may be of any
+/// length, and one of them may be part of many messages.
+std::string shortened(std::string_view text, std::size_t most = 100);
 
 /// Something in a scene file that is wrong or unknown.
 struct Fault {
@@ -38,10 +43,11 @@ class SceneError : public std::runtime_error {
 };
 
 /// Collects findings in the order of the file. Findings of the same kind are counted, and only the first of them is
-/// kept.
+/// kept. Extremely long messages are shortened.
 class Findings {
  public:
-  void fault(std::string where, const std::string& kind, std::string message, std::string consequence);
+  /// Beyond a limit on the number of kinds, faults are only counted, as one last fault that names the limit.
+  void fault(std::string where, const std::string& kind, const std::string& message, const std::string& consequence);
   /// Adds a warning about something that is not read as written. The message says what was found and what is done
   /// instead.
   void warn(const std::string& where, const std::string& kind, const std::string& message);
@@ -59,6 +65,8 @@ class Findings {
   std::vector<std::string> notes() const;
 
  private:
+  void leaveOut(std::string where);
+
   struct Warning {
     std::string where, message;
     std::size_t count;

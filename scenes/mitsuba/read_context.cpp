@@ -41,11 +41,12 @@ std::string typeOf(const ReadContext& context, pugi::xml_node node) {
 
 std::string describe(pugi::xml_node node) {
   const pugi::xml_attribute type = node.attribute("type");
-  return type ? fmt::format("{} \"{}\"", elementName(node), type.value()) : std::string(elementName(node));
+  const std::string name = shortened(elementName(node));
+  return type ? fmt::format("{} \"{}\"", name, shortened(type.value())) : name;
 }
 
 std::string nameOf(pugi::xml_node node) {
-  return node.type() == pugi::node_element ? fmt::format("this <{}>", node.name()) : "this text";
+  return node.type() == pugi::node_element ? fmt::format("this <{}>", shortened(node.name())) : "this text";
 }
 
 std::string_view elementName(pugi::xml_node node) {

@@ -56,7 +56,7 @@ class Nesting {
 /// The type attribute. Throws SceneError when there is none.
 std::string typeOf(const ReadContext& context, pugi::xml_node node);
 
-/// "bsdf \"plastic\"", or "scene" for an element without type.
+/// "bsdf \"plastic\"", or "scene" for an element without type; long names are shortened.
 std::string describe(pugi::xml_node node);
 
 /// "this <bsdf>", or "this text".

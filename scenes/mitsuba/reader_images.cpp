@@ -151,7 +151,7 @@ std::shared_ptr<const Image> ImageStore::get(ReadContext& context, pugi::xml_nod
   if (entry->second.image) return entry->second.image;
   const std::ptrdiff_t location = parameters.location("filename");
   const std::string message = fmt::format("{}: {}", describe(node), entry->second.fault);
-  if (std::filesystem::exists(request.path)) context.file.fail(location, message);
+  if (pathExists(request.path)) context.file.fail(location, message);
   context.unsupported(location, "missing image " + request.path.string(), message, remedy);
   return nullptr;
 }

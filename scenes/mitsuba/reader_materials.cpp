@@ -119,7 +119,7 @@ bool MaterialReader::resolveFile(pugi::xml_node node, Parameters& parameters) {
   if (!parameters.holdsText("filename")) return true;  // makeBsdf reports the error
   const std::ptrdiff_t location = parameters.location("filename");
   const std::filesystem::path path = context_.file.resolve(parameters.text("filename", ""), location);
-  if (!std::filesystem::exists(path)) {
+  if (!pathExists(path)) {
     context_.unsupported(location, "missing file " + path.string(),
                          fmt::format("{}: {} does not exist", describe(node), path.string()), "diffuse 0.5 is used");
     return false;

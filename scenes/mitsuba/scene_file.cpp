@@ -4,7 +4,6 @@
 #include <cctype>
 #include <cstdlib>
 #include <cstring>
-#include <optional>
 #include <vector>
 
 #include <fmt/format.h>
@@ -28,11 +27,12 @@ const std::string& nameOf(const std::pair<const std::string, std::string>& defin
   return definition.first;
 }
 
-/// Up to ten of the names in a container of names or definitions, and the number of others.
+/// Up to ten of the names, shortened, in a container of names or definitions, and the number of others.
 std::string listed(const auto& names) {
   constexpr std::size_t kMost = 10;
   std::vector<std::string> some;
-  for (auto name = names.begin(); name != names.end() && some.size() < kMost; ++name) some.push_back(nameOf(*name));
+  for (auto name = names.begin(); name != names.end() && some.size() < kMost; ++name)
+    some.push_back(shortened(nameOf(*name)));
   const std::string text = fmt::format("{}", fmt::join(some, ", "));
   return names.size() > kMost ? fmt::format("{} and {} more", text, names.size() - kMost) : text;
 }
@@ -95,44 +95,11 @@ pugi::xml_node sceneIn(pugi::xml_document& document, std::string_view text, Pars
   return scene;
 }
 
-bool equalButForCase(std::string_view a, std::string_view b) {
-  return std::ranges::equal(a, b, [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
-}
-
-/// The only entry of the folder whose name differs at most in case.
-std::optional<std::filesystem::path> entryOfSimilarName(const std::filesystem::path& folder, const std::string& name) {
-  std::optional<std::filesystem::path> found;
-  std::error_code error;
-  const std::filesystem::path place = folder.empty() ? "." : folder;
-  for (const auto& entry : std::filesystem::directory_iterator(place, error)) {
-    if (!equalButForCase(entry.path().filename().string(), name)) continue;
-    if (found) return std::nullopt;
-    found = folder / entry.path().filename();
-  }
-  return found;
-}
-
-/// The file that the name matches when case and the difference between '/' and '\\' are ignored, as on Windows; nullopt
-/// unless there is exactly one.
-std::optional<std::filesystem::path> fileOfSimilarName(std::filesystem::path folder, std::string name) {
-  std::ranges::replace(name, '\\', '/');
-  for (const std::filesystem::path& part : std::filesystem::path(name)) {
-    if (part.empty() || part == "." || part == ".." || part == "/" || std::filesystem::exists(folder / part)) {
-      folder /= part;
-      continue;
-    }
-    const std::optional<std::filesystem::path> next = entryOfSimilarName(folder, part.string());
-    if (!next) return std::nullopt;
-    folder = *next;
-  }
-  return folder;
-}
-
 }  // namespace
 
 SceneFile::SceneFile(const std::filesystem::path& path, const std::map<std::string, std::string>& definitions,
                      Findings& findings)
-    : findings_(findings), values_(definitions) {
+    : findings_(findings), search_(path.parent_path()), values_(definitions) {
   Expansion expansion;
   {
     pugi::xml_document document;
@@ -143,7 +110,8 @@ SceneFile::SceneFile(const std::filesystem::path& path, const std::map<std::stri
   text_ = std::move(expansion.text);
   segments_ = std::move(expansion.segments);
   parse();
-  folders_.clear();  // they are in the order in which the files were opened, not in that of the elements
+  search_.clear();  // the folders are in the order in which the files were opened, not in that of the elements
+  paths_ = 0;
   readFolders(scene_, 0);
   substitute(scene_);
   indexIds(scene_);
@@ -195,14 +163,12 @@ void SceneFile::readDefaults(pugi::xml_node scene, std::ptrdiff_t start) {
 void SceneFile::readFolders(pugi::xml_node scene, std::ptrdiff_t start) {
   for (const pugi::xml_node node : scene.children("path")) {
     const std::ptrdiff_t at = start + location(node);
-    if (folders_.size() == kMostFolders) fail(at, fmt::format("more than {} <path>s", kMostFolders));
+    if (++paths_ > kMostFolders) fail(at, fmt::format("more than {} <path>s", kMostFolders));
     const std::filesystem::path folder = resolve(substituted(node.attribute("value").value(), at), at);
     if (!node.attribute("value"))
       fault(at, "<path> needs a value", "it is ignored");
-    else if (!std::filesystem::is_directory(folder))
+    else if (!search_.add(folder))
       fault(at, fmt::format("<path>: there is no folder {}", folder.string()), "it is ignored");
-    else
-      folders_.push_back(folder);
   }
 }
 
@@ -222,13 +188,15 @@ std::size_t SceneFile::addIncluded(pugi::xml_node include, std::size_t around) {
   if (!name) fail(at, "<include> needs a filename");
   if (files_.size() > kMostIncludes) fail(at, fmt::format("more than {} <include>s", kMostIncludes));
   const std::filesystem::path path = resolve(substituted(name.value(), at), at);
-  if (!std::filesystem::is_regular_file(path)) fail(at, fmt::format("<include>: no file {}", path.string()));
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) fail(at, fmt::format("<include>: no file {}", path.string()));
   for (std::size_t file = around;; file = files_[file].parent) {
-    if (std::filesystem::equivalent(files_[file].path, path))
+    if (std::filesystem::equivalent(files_[file].path, path, error))
       fail(at, fmt::format("<include>: {} includes itself", path.string()));
     if (file == 0) break;
   }
-  const std::uintmax_t size = std::filesystem::file_size(path);
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error) fail(at, fmt::format("<include>: {}: {}", path.string(), error.message()));
   if (files_[0].text.size() + included_ + size > kLongestText)
     fail(at, fmt::format("the file with all included files is longer than {} bytes", kLongestText));
   included_ += size;
@@ -306,11 +274,7 @@ std::string SceneFile::substituted(const std::string& text, std::ptrdiff_t locat
     while (end < text.size() && isNameCharacter(text[end])) ++end;
     const std::string name = text.substr(i + 1, end - i - 1);
     const auto it = values_.find(name);
-    if (it == values_.end())
-      fault(location,
-            fmt::format("${} is not defined: neither by a <default> nor by -D{}", name,
-                        values_.empty() ? "" : fmt::format("; defined are {}", listed(values_))),
-            "the element is left out");
+    if (it == values_.end()) reportUndefined(name, location);
     result += it == values_.end() ? "$" + name : it->second;
     if (result.size() > kLongestValue)
       fail(location, fmt::format("with its $names replaced, a value is longer than {} characters", kLongestValue));
@@ -321,6 +285,13 @@ std::string SceneFile::substituted(const std::string& text, std::ptrdiff_t locat
   if (substituted_ > kLongestText)
     fail(location, fmt::format("with all $names replaced, the values are longer than {} characters", kLongestText));
   return result;
+}
+
+void SceneFile::reportUndefined(const std::string& name, std::ptrdiff_t location) {
+  findings_.fault(where(location), fmt::format("${} is not defined", name),
+                  fmt::format("${} is not defined: neither by a <default> nor by -D{}", shortened(name),
+                              values_.empty() ? "" : fmt::format("; defined are {}", listed(values_))),
+                  "the element is left out");
 }
 
 void SceneFile::checkDefinitionsUsed(const std::map<std::string, std::string>& definitions,
@@ -366,25 +337,14 @@ void SceneFile::indexAliases() {
 }
 
 std::filesystem::path SceneFile::resolve(const std::string& name, std::ptrdiff_t location) const {
-  std::filesystem::path path = find(name, location);
-  findings_.addFile(path);
-  return path;
-}
-
-std::filesystem::path SceneFile::find(const std::string& name, std::ptrdiff_t location) const {
-  std::vector<std::filesystem::path> folders(folders_.rbegin(), folders_.rend());
-  folders.push_back(files_[0].path.parent_path());
-  for (const std::filesystem::path& folder : folders)
-    if (std::filesystem::exists(folder / name)) return folder / name;
-  for (const std::filesystem::path& folder : folders) {
-    const std::optional<std::filesystem::path> similar = fileOfSimilarName(folder, name);
-    if (!similar) continue;
+  const FileSearch::Result& found = search_.find(name);
+  if (!found.wanted.empty()) {
     const std::string message =
-        fmt::format("{} does not exist: {} is used instead", (folder / name).string(), similar->string());
+        fmt::format("{} does not exist: {} is used instead", found.wanted.string(), found.path.string());
     findings_.warn(where(location), message, message);
-    return *similar;
   }
-  return folders.back() / name;
+  findings_.addFile(found.path);
+  return found.path;
 }
 
 int SceneFile::majorVersion() const {

@@ -16,6 +16,7 @@
 
 #include <pugixml.hpp>
 
+#include "scenes/mitsuba/file_search.h"
 #include "scenes/mitsuba/file_text.h"
 #include "scenes/mitsuba/findings.h"
 
@@ -86,7 +87,6 @@ class SceneFile {
     std::vector<Segment> segments;
   };
 
-  std::filesystem::path find(const std::string& name, std::ptrdiff_t location) const;
   void fault(std::ptrdiff_t location, const std::string& message, const std::string& consequence);
   void parse();
   void checkDepth() const;
@@ -102,6 +102,7 @@ class SceneFile {
   const Segment& segmentAt(std::size_t offset) const;
   void substitute(pugi::xml_node node);
   std::string substituted(const std::string& text, std::ptrdiff_t location);
+  void reportUndefined(const std::string& name, std::ptrdiff_t location);
   void indexIds(pugi::xml_node node);
   void indexAliases();
 
@@ -109,7 +110,8 @@ class SceneFile {
   std::vector<File> files_;
   std::string text_;
   std::vector<Segment> segments_;  // in order; the first begins at 0. While files are read, each is one segment
-  std::vector<std::filesystem::path> folders_;
+  mutable FileSearch search_;      // it remembers what it has found
+  std::size_t paths_ = 0;          // <path> elements that have been read
   pugi::xml_document document_;
   pugi::xml_node scene_;
   std::map<std::string, std::string> values_;

@@ -49,6 +49,7 @@ std::string_view nearest(std::string_view wanted, std::string_view names) {
   while (!names.empty()) {
     const std::string_view name = names.substr(0, names.find(", "));
     names.remove_prefix(std::min(name.size() + 2, names.size()));
+    if (wanted.size() >= 2 * name.size()) continue;  // the distance would be at least the length of the name
     const std::size_t distance = editDistance(wanted, name);
     if (distance >= std::min(least, name.size())) continue;
     least = distance;

@@ -1,9 +1,12 @@
 // Files with several faults, files for older versions, and encodings: what is reported, and what is read nevertheless.
 
+#include <functional>
+
 #include <fmt/format.h>
 #include <catch2/catch.hpp>
 
 #include "runtime/core/parallel.h"
+#include "scenes/mitsuba/file_search.h"
 #include "scenes/mitsuba/findings.h"
 #include "tests/support/scenes_test_tools.h"
 
@@ -136,20 +139,25 @@ TEST_CASE("scenes: checkScene reports whether a scene can be read and does not t
 }
 
 TEST_CASE("scenes: reading ends early in a cancelled task, also where it has no parallel loop") {
+  const auto isCancelled = [](const std::function<void()>& work) {
+    tbb::task_group_context context(tbb::task_group_context::isolated);
+    tbb::task_group group(context);
+    bool cancelled = false;
+    group.run_and_wait([&] {
+      context.cancel_group_execution();
+      try {
+        work();
+      } catch (const LoopCancelled&) {
+        cancelled = true;
+      }
+    });
+    return cancelled;
+  };
   ReadOptions materialsOnly;
   materialsOnly.geometry = false;
-  tbb::task_group_context context(tbb::task_group_context::isolated);
-  tbb::task_group group(context);
-  bool cancelled = false;
-  group.run_and_wait([&] {
-    context.cancel_group_execution();
-    try {
-      readBody("<bsdf type=\"diffuse\"/>", materialsOnly);
-    } catch (const LoopCancelled&) {
-      cancelled = true;
-    }
-  });
-  CHECK(cancelled);
+  CHECK(isCancelled([&] { readBody("<bsdf type=\"diffuse\"/>", materialsOnly); }));
+  const TestFolder folder;
+  CHECK(isCancelled([&] { FileSearch(folder.path()).find("a.png"); }));
 }
 
 TEST_CASE("scenes: unused parameters cause a warning in old files and a fault in new ones") {
@@ -191,6 +199,57 @@ TEST_CASE("scenes: a file whose name differs in case or slashes is found when it
   CHECK(read("Parts/Ball.xml").warnings.empty());
   folder.write("Parts/BALL.xml", "<scene version=\"3.0.0\"/>");
   CHECK_THROWS_WITH(read("Parts/ball.xml"), Catch::Contains("no file"));
+}
+
+TEST_CASE("scenes: files are looked for in the last folder first, also if it is given twice") {
+  const TestFolder folder;
+  for (const std::string name : {"a", "b"}) {
+    std::filesystem::create_directory(folder.path() / name);
+    folder.write(name + "/part.xml", "<scene version=\"3.0.0\"><shape type=\"cube\" id=\"" + name + "\"/></scene>");
+  }
+  const auto nameIn = [&](const std::string& folders) {
+    const std::string body = folders + "<include filename=\"part.xml\"/>";
+    return readScene(folder.write("test.xml", sceneOf(body))).shapes.at(0).name;
+  };
+  const std::string a = "<path value=\"a\"/>", b = "<path value=\"b\"/>";
+  CHECK(nameIn(a + b) == "b");
+  CHECK(nameIn(a + b + a) == "a");
+}
+
+// Searching all entries of all folders for each name would take far longer than the time limit of a test.
+TEST_CASE("scenes: many names of missing files and equal folders take little time") {
+  const TestFolder folder;
+  for (int i = 0; i < 1000; ++i) folder.write(fmt::format("{}.png", i), "");
+  std::string body;
+  for (int i = 0; i < 1000; ++i) body += "<path value=\".\"/>";
+  for (int i = 0; i < 2000; ++i)
+    body += fmt::format(
+        "<texture type=\"bitmap\" id=\"t{0}\"><string name=\"filename\" value=\"none{0}.png\"/></texture>", i);
+  CHECK(checkScene(folder.write("test.xml", sceneOf(body))).faults.size() == 2000);
+}
+
+TEST_CASE("scenes: names that the file system refuses are faults like those of missing files") {
+  const TestFolder folder;
+  std::filesystem::create_symlink("loop", folder.path() / "loop");
+  const std::string filename = "<string name=\"filename\" value=\"";
+  const std::vector<std::pair<std::string, std::string>> elements = {
+      {"<texture type=\"bitmap\" id=\"t\">" + filename, "\"/></texture>"},
+      {"<emitter type=\"envmap\">" + filename, "\"/></emitter>"},
+      {"<shape type=\"obj\">" + filename, "\"/></shape>"},
+      {"<shape type=\"cube\"><bsdf type=\"merl\">" + filename, "\"/></bsdf></shape>"},
+      {"<bsdf type=\"diffuse\"><spectrum name=\"reflectance\" filename=\"", "\"/></bsdf>"},
+      {"<include filename=\"", "\"/>"},
+      {"<path value=\"", "\"/>"}};
+  for (const std::string& name : {std::string("loop"), std::string("loop/file"), std::string(300, 'a')})
+    for (const auto& [before, after] : elements) {
+      const std::string body = before + name + after + "<shape type=\"torus\"/><shape type=\"sphere\"/>";
+      CAPTURE(body);
+      const auto path = folder.write("test.xml", sceneOf(body));
+      const SceneCheck found = checkScene(path);
+      REQUIRE(found.faults.size() == 2);
+      for (const Fault& fault : found.faults) CHECK_THAT(fault.where, Catch::Contains("test.xml:2:"));
+      CHECK_NOTHROW(readScene(path, lenient()));
+    }
 }
 
 TEST_CASE("scenes: files in other encodings are read alone and included in each other") {
@@ -276,6 +335,48 @@ TEST_CASE("scenes: many faults in a single line take neither much time nor much 
   CHECK_THAT(found.faults[0].text(), Catch::Contains(fmt::format("test.xml:2:{}: $none is not defined", column)));
   CHECK_THAT(found.faults[0].text(), Catch::Contains("defined are a00000, a00001, ") &&
                                          Catch::Contains(", a00009 and 19990 more") && !Catch::Contains("a00010"));
+}
+
+TEST_CASE("scenes: names and values of any length are shortened in messages") {
+  CHECK(shortened("name", 4) == "name");
+  CHECK(shortened("longer name", 6) == "longer...");
+  CHECK(shortened("\xc3\xa4\xc3\xb6\xc3\xbc", 3) == "\xc3\xa4...");
+  const std::string name(200000, 'a');
+  std::string defaults;
+  for (int i = 0; i < 3; ++i) defaults += fmt::format("<default name=\"{}{}\" value=\"1\"/>", name, i);
+  CHECK(faultOf(defaults + "<bsdf type=\"$none\"/>").size() < 1000);
+  CHECK_THAT(faultOf(defaults + "<bsdf type=\"$none\"/>"), Catch::Contains("aaa..., aaa"));
+  const std::string parameter = "<float name=\"power\" value=\"1\"/>";
+  for (const std::string& body :
+       {"<integrator type=\"" + name + "\">" + parameter + "</integrator>", "<" + name + "/>",
+        "<bsdf type=\"" + name + "\"/>", "<bsdf type=\"diffuse\"><ref id=\"" + name + "\"/></bsdf>",
+        "<bsdf type=\"diffuse\"><float name=\"reflectance\" value=\"" + name + "\"/></bsdf>",
+        "<bsdf type=\"diffuse\"><float name=\"" + name + "\" value=\"1\"/></bsdf>"}) {
+    for (const std::string& text : {sceneOf(body), oldSceneOf(body)}) {
+      const SceneCheck found = check(text);
+      for (const Fault& fault : found.faults) CHECK(fault.text().size() < 10000);
+      for (const std::string& line : found.warnings) CHECK(line.size() < 10000);
+      for (const std::string& line : found.notes) CHECK(line.size() < 10000);
+    }
+  }
+}
+
+TEST_CASE("scenes: undefined names are of one kind although more names are defined after the first of them") {
+  const SceneCheck found = check(sceneOf("<default name=\"a\" value=\"$none\"/><default name=\"b\" value=\"$none\"/>"));
+  REQUIRE(found.faults.size() == 1);
+  CHECK(found.faults[0].count == 2);
+}
+
+TEST_CASE("scenes: the number of kinds of faults is limited with a fault that names the limit") {
+  std::string body;
+  for (int i = 0; i < 10005; ++i) body += fmt::format("<shape type=\"torus{}\"/>\n", i);
+  const SceneCheck found = check(sceneOf(body + "<shape type=\"torus1\"/><shape type=\"sphere\"/>"), true);
+  CHECK(!found.readable);
+  REQUIRE(found.faults.size() == 10001);
+  CHECK(found.faults[1].count == 2);
+  CHECK(found.faults.back().count == 5);
+  CHECK_THAT(found.faults.back().text(),
+             Catch::Contains("test.xml:10002:1: ") && Catch::Contains("at most 10000 kinds of faults"));
 }
 
 // Parsing the scene again after each of them would take far longer than the time limit of a test.

@@ -1,0 +1,97 @@
+#include "scenes/mitsuba/file_search.h"
+
+#include <algorithm>
+#include <cctype>
+#include <iterator>
+#include <system_error>
+
+#include "runtime/core/parallel.h"
+
+namespace lobe {
+namespace {
+
+std::string lowerCase(std::string text) {
+  std::ranges::transform(text, text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+}  // namespace
+
+bool pathExists(const std::filesystem::path& path) {
+  std::error_code error;
+  return std::filesystem::exists(path, error);
+}
+
+bool FileSearch::add(const std::filesystem::path& folder) {
+  std::error_code error;
+  Folder added{folder, std::filesystem::canonical(folder, error)};
+  if (error || !std::filesystem::is_directory(added.canonical, error)) return false;
+  const auto known =
+      std::ranges::find_if(folders_, [&](const Folder& f) { return f.canonical.native() == added.canonical.native(); });
+  if (known == folders_.end())
+    folders_.push_back(std::move(added));
+  else
+    std::rotate(known, known + 1, folders_.end());
+  results_.clear();
+  return true;
+}
+
+void FileSearch::clear() {
+  folders_.clear();
+  results_.clear();
+}
+
+const FileSearch::Result& FileSearch::find(const std::string& name) {
+  if (const auto known = results_.find(name); known != results_.end()) return known->second;
+  return results_.emplace(name, search(name)).first->second;
+}
+
+FileSearch::Result FileSearch::search(const std::string& name) {
+  std::vector<std::filesystem::path> folders;
+  for (auto folder = folders_.rbegin(); folder != folders_.rend(); ++folder) folders.push_back(folder->path);
+  folders.push_back(own_);
+  for (const std::filesystem::path& folder : folders) {
+    throwIfCancelled();
+    if (pathExists(folder / name)) return {folder / name, {}};
+  }
+  for (const std::filesystem::path& folder : folders) {
+    throwIfCancelled();
+    if (std::optional<std::filesystem::path> similar = fileOfSimilarName(folder, name))
+      return {std::move(*similar), folder / name};
+  }
+  return {own_ / name, {}};
+}
+
+/// The file that the name matches when case and the difference between '/' and '\\' are ignored, as on Windows; nullopt
+/// unless there is exactly one.
+std::optional<std::filesystem::path> FileSearch::fileOfSimilarName(std::filesystem::path folder, std::string name) {
+  std::ranges::replace(name, '\\', '/');
+  for (const std::filesystem::path& part : std::filesystem::path(name)) {
+    if (part.empty() || part == "." || part == ".." || part == "/" || pathExists(folder / part)) {
+      folder /= part;
+      continue;
+    }
+    const std::optional<std::string> next = similarEntry(folder, part.string());
+    if (!next || !pathExists(folder / *next)) return std::nullopt;
+    folder /= *next;
+  }
+  return folder;
+}
+
+/// The only entry of the folder whose name differs at most in case.
+std::optional<std::string> FileSearch::similarEntry(const std::filesystem::path& folder, const std::string& name) {
+  const auto [listing, isNew] = listings_.try_emplace(folder);
+  if (isNew) {
+    std::error_code error;
+    std::filesystem::directory_iterator entry(folder.empty() ? "." : folder, error);
+    for (; !error && entry != std::filesystem::directory_iterator(); entry.increment(error)) {
+      throwIfCancelled();
+      const std::string found = entry->path().filename().string();
+      listing->second.emplace(lowerCase(found), found);
+    }
+  }
+  const auto [first, last] = listing->second.equal_range(lowerCase(name));
+  return first != last && std::next(first) == last ? std::optional(first->second) : std::nullopt;
+}
+
+}  // namespace lobe
