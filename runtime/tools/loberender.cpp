@@ -99,10 +99,10 @@ void declareTraining(CLI::App& app, Options& options) {
   app.add_option("--passes", job.passes,
                  "Number of training passes (default: 8, or unlimited if the training time is limited)");
   app.add_option("--photons", plan.photons, "Number of photons per pass")
-      ->check(CLI::PositiveNumber)
+      ->check(CLI::Range(1, TrainingPlan::kMostParticles))
       ->capture_default_str();
   app.add_option("--importons", plan.importons, "Number of importons per pass")
-      ->check(CLI::PositiveNumber)
+      ->check(CLI::Range(1, TrainingPlan::kMostParticles))
       ->capture_default_str();
   app.add_option("--components", plan.records.components, "Number of Gaussians per illumination record")
       ->check(CLI::Range(1, FieldOptions::kMostComponents))

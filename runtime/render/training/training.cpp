@@ -152,8 +152,8 @@ void TrainingPlan::validate() const {
     if (!condition) throw std::runtime_error(message);
   };
   require(passes >= 1, "training passes: must be at least 1");
-  require(photons >= 1, "training photons: must be at least 1");
-  require(importons >= 1, "training importons: must be at least 1");
+  require(photons >= 1 && photons <= kMostParticles, "training photons: must be between 1 and 100000000");
+  require(importons >= 1 && importons <= kMostParticles, "training importons: must be between 1 and 100000000");
   require(seconds > 0, "training seconds: must be positive");
   records.validate();
 }

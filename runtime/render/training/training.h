@@ -20,6 +20,9 @@ std::map<std::string, TrainFrom> trainFromNames();
 
 struct TrainingPlan {
   TrainFrom from = TrainFrom::both;
+  /// Limit on photons and importons: storing what they learn takes tens of gigabytes.
+  static constexpr int kMostParticles = 100000000;
+
   int passes = 8;
   int photons = 300000;    ///< per pass; none are traced for TrainFrom::paths
   int importons = 100000;  ///< per pass
