@@ -4,6 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include <Eigen/LU>
+
 namespace lobe {
 namespace {
 
@@ -26,15 +28,13 @@ struct Bounds {
     const Vec3 radius = cylinder.u.cwiseAbs() + cylinder.v.cwiseAbs();
     return around(cylinder.base, radius).merged(around(cylinder.base + cylinder.axis, radius));
   }
-  Box operator()(const Instance& instance) const {
-    return lobe::boundsOf((*groups)[static_cast<std::size_t>(instance.group)], instance.toWorld);
-  }
+  Box operator()(const Instance& instance) const { return lobe::boundsOf(instance, *groups); }
 
   static Box around(const Vec3& centre, const Vec3& reach) {
     return {(centre - reach).cast<double>(), (centre + reach).cast<double>()};
   }
 
-  const std::vector<ShapeGroup>* groups;
+  const std::vector<Box>* groups;
 };
 
 struct Scaling {
@@ -56,7 +56,7 @@ struct Scaling {
   float factor;
 };
 
-Box boundsOf(const std::vector<Shape>& shapes, const std::vector<ShapeGroup>& groups) {
+Box boundsOf(const std::vector<Shape>& shapes, const std::vector<Box>& groups) {
   Box box;
   for (const Shape& shape : shapes) box.extend(std::visit(Bounds{&groups}, shape.geometry));
   return box;
@@ -90,17 +90,16 @@ void scaleGroups(Scene& scene) {
       instance->toWorld.linear() /= factors[static_cast<std::size_t>(instance->group)];
 }
 
-/// Keeps the entries of the matrix near 1, as ray directions require, and scales the lengths in the camera's frame
-/// instead. The film of an orthographic camera has the size given by the matrix.
+/// Brings the entries of the matrix into range, as ray directions require, and scales the lengths in the camera's frame
+/// inversely. The film of an orthographic camera has the size given by the matrix.
 void scaleCamera(Camera& camera, float factor) {
   auto linear = camera.toWorld.topLeftCorner<3, 3>();
   camera.toWorld.topRightCorner<3, 1>() *= factor;
-  const float size = linear.cwiseAbs().maxCoeff();
-  const float toUnit = size > 0 ? std::ldexp(1.0f, -std::ilogb(size)) : 1.0f;
-  linear.leftCols<2>() *= camera.kind == Camera::Kind::orthographic ? factor : toUnit;
-  linear.col(2) *= toUnit;
+  const float inRange = factorFor(linear.cwiseAbs().maxCoeff());
+  linear.leftCols<2>() *= camera.kind == Camera::Kind::orthographic ? factor : inRange;
+  linear.col(2) *= inRange;
   for (float* length : {&camera.apertureRadius, &camera.focusDistance, &camera.nearClip, &camera.farClip})
-    *length *= factor / toUnit;
+    *length *= factor / inRange;
 }
 
 struct LightScaling {
@@ -124,7 +123,7 @@ struct LightScaling {
 };
 
 double largestCoordinate(const Scene& scene) {
-  double largest = largestCoordinate(boundsOf(scene.shapes, scene.groups));
+  double largest = largestCoordinate(boundsOf(scene.shapes, boundsOfGroups(scene)));
   const auto add = [&](const Vec3& p) { largest = std::max(largest, static_cast<double>(p.cwiseAbs().maxCoeff())); };
   add(scene.camera.toWorld.topRightCorner<3, 1>());
   for (const DeltaLight& light : scene.lights)
@@ -138,18 +137,43 @@ double largestCoordinate(const Scene& scene) {
 
 }  // namespace
 
-Eigen::AlignedBox3d boundsOf(const ShapeGroup& group, const Eigen::Affine3f& toWorld) {
-  const Box box = boundsOf(group.shapes, {});
-  return box.isEmpty() ? box : box.transformed(toWorld.cast<double>());
+std::vector<Eigen::AlignedBox3d> boundsOfGroups(const Scene& scene) {
+  std::vector<Box> boxes;
+  for (const ShapeGroup& group : scene.groups) boxes.push_back(boundsOf(group.shapes, {}));
+  return boxes;
+}
+
+Eigen::AlignedBox3d boundsOf(const Instance& instance, const std::vector<Eigen::AlignedBox3d>& groups) {
+  const Box& box = groups[static_cast<std::size_t>(instance.group)];
+  return box.isEmpty() ? box : box.transformed(instance.toWorld.cast<double>());
 }
 
 void bringIntoRange(Scene& scene) {
   scaleGroups(scene);
   scene.scale = factorFor(largestCoordinate(scene));
+  scaleCamera(scene.camera, scene.scale);
   if (scene.scale == 1.0f) return;
   scaleShapes(scene.shapes, scene.scale);
-  scaleCamera(scene.camera, scene.scale);
   for (DeltaLight& light : scene.lights) std::visit(LightScaling{scene.scale}, light);
+}
+
+double reachOfRays(const Scene& scene) {
+  constexpr double kSphere = 4;
+  return kSphere * largestCoordinate(scene);
+}
+
+double growthOfRays(const Instance& instance) {
+  const Eigen::Matrix3d inverse = instance.toWorld.linear().cast<double>().inverse();
+  return inverse.cwiseAbs().rowwise().sum().maxCoeff();
+}
+
+bool isTraceable(const Instance& instance, double reach) {
+  return growthOfRays(instance) * std::max(1.0, reach) < kLargestInRay;
+}
+
+bool isResolved(const Eigen::AlignedBox3d& box, double reach) {
+  constexpr double kPrecision = 1e-6;
+  return box.sizes().maxCoeff() > kPrecision * reach;
 }
 
 }  // namespace lobe

@@ -47,6 +47,7 @@ class SceneReader {
     if (!context_.options.geometry) return;
     shapes_.readMeshes();
     bringIntoRange();
+    shapes_.leaveOutFlatInstances();
   }
 
  private:

@@ -7,10 +7,12 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <Eigen/LU>
 
 #include "scenes/camera.h"
 #include "scenes/mitsuba/reader_parameters.h"
 #include "scenes/mitsuba/values.h"
+#include "scenes/scene_scale.h"
 
 namespace lobe {
 namespace {
@@ -22,11 +24,29 @@ constexpr PixelFilter kDefaultFilter{PixelFilter::Kind::gaussian, 2.0f, 0.5f};
 
 constexpr std::array<std::string_view, 6> kFilters = {"box", "catmullrom", "gaussian", "lanczos", "mitchell", "tent"};
 
+// Limits that no camera reaches, but within which rays are finite.
+constexpr double kLargestRadius = 100, kSmallestRadius = 1e-6;  // of filters, in pixels
+constexpr double kLargestCoefficient = 100;                     // of filters
+constexpr double kLargestOffset = 1e4;                          // of the principal point, in sizes of the film
+constexpr double kNarrowestView = 1e-6;                         // degrees
+constexpr double kLargestAperture = 1e6;                        // radius, in focus distances
+constexpr double kSmallestLength = 1e-35;                       // in the world
+
+/// A number from -limit to limit.
+float boundedNumber(const Parameters& parameters, const char* name, double fallback, double limit) {
+  const double value = parameters.number(name, fallback);
+  if (!(std::abs(value) <= limit))
+    throw ParameterError(name, fmt::format("{} must be from {} to {}, not {}", name, -limit, limit, value));
+  return static_cast<float>(value);
+}
+
 /// Parameters as in Mitsuba, whose Gaussian extends four standard deviations to each side.
 PixelFilter makeFilter(const std::string& type, const Parameters& parameters) {
-  const auto number = [&](const char* name, double fallback) {
+  const auto number = [&](const char* name, double fallback, double largest = kLargestRadius) {
     const double value = parameters.number(name, fallback);
-    if (!(value > 0.0)) throw ParameterError(name, fmt::format("{} must be positive, not {}", name, value));
+    if (!(value >= kSmallestRadius && value <= largest))
+      throw ParameterError(name,
+                           fmt::format("{} must be from {} to {}, not {}", name, kSmallestRadius, largest, value));
     return static_cast<float>(value);
   };
   if (type == "box") return {PixelFilter::Kind::box, number("radius", 0.5), 0.5f};
@@ -34,13 +54,15 @@ PixelFilter makeFilter(const std::string& type, const Parameters& parameters) {
   if (type == "catmullrom") return {PixelFilter::Kind::mitchell, 2.0f, 0.5f, 0.0f, 0.5f};
   if (type == "lanczos") return {PixelFilter::Kind::lanczos, number("lobes", 3.0)};
   if (type == "mitchell") {
-    const auto fraction = [&](const char* name) { return static_cast<float>(parameters.number(name, 1.0 / 3.0)); };
+    const auto coefficient = [&](const char* name) {
+      return boundedNumber(parameters, name, 1.0 / 3.0, kLargestCoefficient);
+    };
     // Mitsuba 3's manual calls them A and B; its code, like that of 0.6, reads B and C. Both are accepted.
     const bool new3 = parameters.has("a");
-    return {PixelFilter::Kind::mitchell, number("radius", 2.0), 0.5f, fraction(new3 ? "a" : "b"),
-            fraction(new3 ? "b" : "c")};
+    return {PixelFilter::Kind::mitchell, number("radius", 2.0), 0.5f, coefficient(new3 ? "a" : "b"),
+            coefficient(new3 ? "b" : "c")};
   }
-  const float stddev = number("stddev", 0.5);
+  const float stddev = number("stddev", 0.5, kLargestRadius / 4);
   return {PixelFilter::Kind::gaussian, 4.0f * stddev, stddev};
 }
 
@@ -162,17 +184,44 @@ void readFieldOfView(const Parameters& parameters, Camera& camera) {
 
 namespace {
 
+/// Throws ParameterError unless rays can be transformed to the world.
+void checkFrame(const Camera& camera) {
+  const Eigen::Matrix3d frame = camera.toWorld.topLeftCorner<3, 3>().cast<double>();
+  if (!(frame.array().abs() <= kLargestCoordinate).all())
+    throw ParameterError("to_world", fmt::format("a camera's scale must not be over {:g}", kLargestCoordinate));
+  if (frame.determinant() == 0 || frame.cwiseAbs().maxCoeff() < kSmallestLength)
+    throw ParameterError("to_world", "a camera's transform must not be singular");
+}
+
+/// A length along an axis of the camera's frame, in the world.
+double inWorld(const Camera& camera, double length) {
+  return length * camera.toWorld.topLeftCorner<3, 3>().cast<double>().colwise().norm().maxCoeff();
+}
+
+/// Throws ParameterError with this name for a length that is too large.
+void checkLength(const Camera& camera, double length, const char* name) {
+  if (!(inWorld(camera, length) <= kLargestCoordinate))
+    throw ParameterError(name, fmt::format("{} is {:g} in the world: lengths over {:g} are not supported", name,
+                                           inWorld(camera, length), kLargestCoordinate));
+}
+
 void readLens(const Parameters& parameters, Camera& camera) {
   if (!parameters.has("aperture_radius")) throw ParameterError("", "the parameter \"aperture_radius\" is needed");
   camera.apertureRadius = static_cast<float>(parameters.number("aperture_radius", 0));
   if (!(camera.apertureRadius >= 0.0f))
     throw ParameterError("aperture_radius",
                          fmt::format("aperture_radius must not be negative, not {}", camera.apertureRadius));
+  checkLength(camera, camera.apertureRadius, "aperture_radius");
   constexpr double kFar = 1e4;  // Mitsuba's default focus distance is far_clip
   camera.focusDistance = static_cast<float>(parameters.number("focus_distance", parameters.number("far_clip", kFar)));
-  if (!(camera.focusDistance > 0.0f))
+  if (!(inWorld(camera, camera.focusDistance) >= kSmallestLength))
     throw ParameterError("focus_distance",
                          fmt::format("focus_distance must be positive, not {}", camera.focusDistance));
+  if (!(camera.apertureRadius <= kLargestAperture * camera.focusDistance))
+    throw ParameterError("aperture_radius",
+                         fmt::format("aperture_radius must be at most {:g} times focus_distance, {}, "
+                                     "not {}",
+                                     kLargestAperture, camera.focusDistance, camera.apertureRadius));
 }
 
 /// Distances along the viewing axis; a plane that the file does not give does not clip.
@@ -181,6 +230,7 @@ void readClipPlanes(const Parameters& parameters, Camera& camera) {
   camera.farClip = parameters.has("far_clip") ? static_cast<float>(parameters.number("far_clip", 0)) : camera.farClip;
   if (!(camera.nearClip >= 0.0f))
     throw ParameterError("near_clip", fmt::format("near_clip must not be negative, not {}", camera.nearClip));
+  checkLength(camera, camera.nearClip, "near_clip");
   if (!(camera.farClip > camera.nearClip))
     throw ParameterError("far_clip",
                          fmt::format("far_clip must be over near_clip, {}, not {}", camera.nearClip, camera.farClip));
@@ -189,8 +239,12 @@ void readClipPlanes(const Parameters& parameters, Camera& camera) {
 void readPerspective(const Parameters& parameters, Camera& camera) {
   readFieldOfView(parameters, camera);
   camera.horizontalFov = horizontalFov(camera, camera.width, camera.height);
-  camera.shift = Vec2(static_cast<float>(parameters.number("principal_point_offset_x", 0)),
-                      static_cast<float>(parameters.number("principal_point_offset_y", 0)));
+  if (!(camera.horizontalFov >= kNarrowestView && camera.horizontalFov < 180.0f))
+    throw ParameterError(parameters.has("fov") ? "fov" : "focal_length",
+                         fmt::format("the horizontal field of view must be from {:g} to 180 degrees, not {}",
+                                     kNarrowestView, camera.horizontalFov));
+  camera.shift = Vec2(boundedNumber(parameters, "principal_point_offset_x", 0, kLargestOffset),
+                      boundedNumber(parameters, "principal_point_offset_y", 0, kLargestOffset));
 }
 
 /// In the order of Camera::Kind.
@@ -201,6 +255,7 @@ Camera readCamera(ReadContext& context, pugi::xml_node node, const Parameters& p
   Camera camera = context.scene.camera;
   camera.kind = kind;
   camera.toWorld = placeInWorld(parameters);
+  checkFrame(camera);
   if (kind != Camera::Kind::orthographic) readPerspective(parameters, camera);
   if (kind == Camera::Kind::thinlens) readLens(parameters, camera);
   readClipPlanes(parameters, camera);

@@ -312,17 +312,36 @@ void ShapeReader::reportFault(const Mesh& mesh) {
 /// Cleared instances remain in the list of shapes, because others are referred to by index; readMeshes removes them at
 /// its end.
 void ShapeReader::clearInstancesOutOfRange() {
-  for (const auto& [index, location] : instances_) {
-    const auto& instance = std::get<Instance>(context_.scene.shapes[index].geometry);
-    const ShapeGroup& group = context_.scene.groups[static_cast<std::size_t>(instance.group)];
-    const Eigen::AlignedBox3d box = boundsOf(group, instance.toWorld);
-    if (box.isEmpty() || (isInRange(box.min().cast<float>()) && isInRange(box.max().cast<float>()))) continue;
+  const std::vector<Eigen::AlignedBox3d> groups = boundsOfGroups(context_.scene);
+  std::erase_if(instances_, [&](const auto& entry) {
+    const auto& [index, location] = entry;
+    Geometry& geometry = context_.scene.shapes[index].geometry;
+    const Eigen::AlignedBox3d box = boundsOf(std::get<Instance>(geometry), groups);
+    if (box.isEmpty() || (isInRange(box.min().cast<float>()) && isInRange(box.max().cast<float>()))) return false;
     context_.unsupported(
         location, fmt::format("instance at {}", location),
         fmt::format("shape \"instance\": coordinates over {:g} in the world are not supported", kLargestCoordinate),
         "the instance is left out");
-    context_.scene.shapes[index].geometry = TriangleMesh();
+    geometry = TriangleMesh();
+    return true;
+  });
+}
+
+void ShapeReader::leaveOutFlatInstances() {
+  if (instances_.empty()) return;
+  const double reach = reachOfRays(context_.scene);
+  const std::vector<Eigen::AlignedBox3d> groups = boundsOfGroups(context_.scene);
+  auto place = instances_.begin();
+  for (Shape& shape : context_.scene.shapes) {
+    const auto* instance = std::get_if<Instance>(&shape.geometry);
+    if (!instance) continue;
+    const std::ptrdiff_t location = (place++)->second;
+    if (isTraceable(*instance, reach) || !isResolved(boundsOf(*instance, groups), reach)) continue;
+    context_.unsupported(location, "flat instance", "shape \"instance\": the instance is too flat to be traced",
+                         "the instance is left out");
+    shape.geometry = TriangleMesh();
   }
+  dropEmpty();
 }
 
 void ShapeReader::noteUnusedMaterials(const Mesh& mesh) {

@@ -19,6 +19,9 @@ class ShapeReader {
   void add(pugi::xml_node node);
   /// Reads the meshes of all shapes added, in parallel. A mesh that cannot be read is reported as a fault and left out.
   void readMeshes();
+  /// Reports a fault for each instance that rays cannot be traced in, and leaves it out. The scene must have its final
+  /// scale.
+  void leaveOutFlatInstances();
 
  private:
   struct Parts {
@@ -68,8 +71,8 @@ class ShapeReader {
   MaterialReader& materials_;
   ObjMaterialReader objMaterials_;
   std::vector<Mesh> meshes_;
-  std::vector<std::pair<std::size_t, std::ptrdiff_t>>
-      instances_;                         // index into the scene's shapes, location in the file
+  // Those in the scene: index into its shapes, valid until dropEmpty, and location in the file.
+  std::vector<std::pair<std::size_t, std::ptrdiff_t>> instances_;
   std::map<std::ptrdiff_t, int> groups_;  // by location in the file
 };
 

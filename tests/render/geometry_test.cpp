@@ -248,6 +248,32 @@ TEST_CASE("render: an instance is equivalent to the transformed mesh") {
   CHECK(differing < 20);  // rays that miss an edge due to rounding
 }
 
+TEST_CASE("render: rays that are not finite or beyond the range of Embree hit nothing") {
+  Scene scene;
+  addShape(scene, Sphere{{0, 0, 0}, 1}, -1);
+  addShape(scene, sphereMesh({0, 0, 0}, 2, 7), -1);
+  const RayTracer tracer(scene);
+  const auto hits = [](const RayTracer& rays, const Ray& ray) { return rays.trace(ray) || rays.occluded(ray); };
+  const Ray usual{{0.1f, 0.2f, 5}, {0, 0, -1}};
+  CHECK(hits(tracer, usual));
+  for (const float value : {std::numeric_limits<float>::quiet_NaN(), kInfinity, -kInfinity, 1e19f, -1e30f})
+    for (int axis = 0; axis < 3; ++axis) {
+      Ray from = usual, along = usual;
+      from.origin[axis] = value;
+      along.direction[axis] = value;
+      CHECK(!hits(tracer, from));
+      CHECK(!hits(tracer, along));
+    }
+  CHECK(!hits(tracer, {usual.origin, usual.direction, std::numeric_limits<float>::quiet_NaN()}));
+  // In the group, the distance is 10^19.
+  Scene flat;
+  flat.groups.resize(1);
+  flat.groups[0].shapes.push_back({"", sphereMesh({0, 0, 0}, 1, 7), -1, std::nullopt});
+  addShape(flat, Instance{0, Eigen::Affine3f(Eigen::Scaling(1.0f, 1.0f, 1e-10f))}, -1);
+  CHECK(hits(RayTracer(flat), usual));
+  CHECK(!hits(RayTracer(flat), {{0.1f, 0.2f, 1e9f}, {0, 0, -1}}));
+}
+
 TEST_CASE("render: rays do not leak out of a spherical mesh") {
   Scene scene;
   addShape(scene, sphereMesh({0, 0, 0}, 1.0f, 40), -1);

@@ -211,6 +211,13 @@ TEST_CASE("render: the environment image has the documented orientation") {
   CHECK(light.radiance(-w).x() == 0);
 }
 
+TEST_CASE("render: a direction that is not a number has no radiance and a pixel of the environment") {
+  const EnvironmentLight light(turnedSky());
+  const Vec3 none = Vec3::Constant(std::numeric_limits<float>::quiet_NaN());
+  CHECK(light.radiance(none).isNaN().all());
+  CHECK(light.pixelOf(none) == Eigen::Vector2i(0, 0));
+}
+
 TEST_CASE("render: invalid pixels of an environment are black") {
   Image image(2, 2, grey(1));
   image.at(0, 0) = Rgb(std::nanf(""), -1, kInfinity);

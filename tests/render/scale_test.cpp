@@ -155,6 +155,22 @@ TEST_CASE("render: a camera scaled together with its scene renders the same imag
   }
 }
 
+TEST_CASE("render: the scale of a camera's frame does not change the picture") {
+  const auto picture = [](const std::string& scale) {
+    return pictureOfText("<emitter type=\"constant\"/><shape type=\"disk\"/>",
+                         "<sensor type=\"perspective\"><float name=\"fov\" value=\"45\"/><transform name=\"to_world\">"
+                         "<scale value=\"" +
+                             scale +
+                             "\"/><lookat origin=\"0,0,4\" target=\"0,0,0\" up=\"0,1,0\"/></transform></sensor>");
+  };
+  const Picture usual = picture("1");
+  CHECK(meanOf(usual) < 0.95);
+  for (const std::string scale : {"1e-30", "1e-10", "1e14"}) {
+    CAPTURE(scale);
+    CHECK(difference(picture(scale), usual) < 0.01);
+  }
+}
+
 TEST_CASE("render: scenes of ordinary size are not rescaled") {
   CHECK(Room(1).read().scale == 1);
   CHECK(Room(1e3).read().scale == 1);

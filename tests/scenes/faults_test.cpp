@@ -185,6 +185,46 @@ TEST_CASE("scenes: invalid cameras and crops are rejected") {
   checkFault(sized(65536, "<integer name=\"cropHeight\" value=\"5000\"/>"), "2:22", {"65536x5000"});
 }
 
+TEST_CASE("scenes: cameras and filters beyond the range of rays are rejected") {
+  const auto fault = [](const std::string& type, const std::string& body) {
+    return faultOfText("<scene version=\"3.0.0\"><sensor type=\"" + type + "\">\n" + body + "</sensor></scene>");
+  };
+  const auto number = [](const std::string& name, const std::string& value) {
+    return "<float name=\"" + name + "\" value=\"" + value + "\"/>";
+  };
+  const auto scale = [](const std::string& value) {
+    return "<transform name=\"to_world\"><scale " + value + "/></transform>";
+  };
+  const std::string limit = "over 1e+15 are not supported";
+  checkFault(fault("perspective", number("principalPointOffsetX", "1e20")), "2:1",
+             {"principal_point_offset_x", "10000"});
+  checkFault(fault("perspective", number("principalPointOffsetY", "-1e20")), "2:1", {"principal_point_offset_y"});
+  checkFault(fault("perspective", number("nearClip", "1e25")), "2:1", {"near_clip", limit});
+  checkFault(fault("orthographic", scale("value=\"100\"") + "\n" + number("nearClip", "1e14")), "3:1",
+             {"near_clip is 1e+16 in the world", limit});
+  checkFault(fault("perspective", number("fov", "1e-40")), "2:1", {"field of view"});
+  checkFault(fault("perspective", "<string name=\"focalLength\" value=\"1e-30mm\"/>"), "2:1", {"field of view"});
+  for (const std::string type : {"perspective", "orthographic"}) {
+    checkFault(fault(type, scale("value=\"1e30\"")), "2:1", {"a camera's scale", "1e+15"});
+    checkFault(fault(type, scale("value=\"0\"")), "2:1", {"singular"});
+    checkFault(fault(type, scale("x=\"0\"")), "2:1", {"singular"});
+    CHECK(fault(type, scale("value=\"1e-30\"")) == "");
+  }
+  const std::string aperture = number("apertureRadius", "1") + "\n";
+  checkFault(fault("thinlens", number("apertureRadius", "1e38")), "2:1", {"aperture_radius", limit});
+  checkFault(fault("thinlens", aperture + number("focusDistance", "1e-44")), "3:1", {"focus_distance"});
+  checkFault(fault("thinlens", aperture + number("focusDistance", "1e-7")), "2:1", {"aperture_radius", "1e+06"});
+  const auto filter = [&](const std::string& type, const std::string& name, const std::string& value) {
+    return fault("perspective", "<film type=\"hdrfilm\"><rfilter type=\"" + type + "\">\n" + number(name, value) +
+                                    "</rfilter></film>");
+  };
+  checkFault(filter("box", "radius", "1e30"), "3:1", {"radius", "1e-06 to 100"});
+  checkFault(filter("tent", "radius", "1e-30"), "3:1", {"radius", "1e-06 to 100"});
+  checkFault(filter("gaussian", "stddev", "1e30"), "3:1", {"stddev", "1e-06 to 25"});
+  checkFault(filter("lanczos", "lobes", "1e9"), "3:1", {"lobes"});
+  checkFault(filter("mitchell", "B", "1e38"), "3:1", {"b must be from -100 to 100"});
+}
+
 TEST_CASE("scenes: missing and damaged files are reported with the scene and the file") {
   const TestFolder folder;
   const auto fault = [&](const std::string& body) {
@@ -235,6 +275,15 @@ TEST_CASE("scenes: invalid groups and instances are rejected") {
   CHECK_THAT(faultOf(group("") + "<shape type=\"instance\"><ref id=\"g\"/><transform name=\"toWorld\"><scale x=\"0\"/>"
                                  "</transform></shape>"),
              Catch::Contains("singular"));
+  const auto scaled = [](const std::string& scale) {
+    return "\n<shape type=\"instance\"><ref id=\"g\"/><transform name=\"toWorld\"><scale " + scale +
+           "/></transform></shape>";
+  };
+  const std::string cubes =
+      group("<shape type=\"cube\"/>") + scaled("value=\"1e16\"") + scaled("value=\"0.5\"") + scaled("x=\"1e-40\"");
+  CHECK_THAT(faultOf(cubes), Catch::Contains("test.xml:3:") && Catch::Contains("over 1e+15") &&
+                                 Catch::Contains("test.xml:5:1: ") && Catch::Contains("too flat"));
+  CHECK(readBody(cubes, lenient()).shapes.size() == 1);
 }
 
 TEST_CASE("scenes: a cylinder of zero length is rejected") {

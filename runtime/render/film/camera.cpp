@@ -55,8 +55,8 @@ void check(const Camera& camera) {
   if (!(camera.horizontalFov > 0.0f && camera.horizontalFov < 180.0f))
     throw std::runtime_error(
         fmt::format("camera: the field of view of {} degrees is not between 0 and 180", camera.horizontalFov));
-  const float determinant = camera.toWorld.topLeftCorner<3, 3>().determinant();
-  if (!camera.toWorld.allFinite() || determinant == 0.0f)
+  const double determinant = camera.toWorld.topLeftCorner<3, 3>().cast<double>().determinant();
+  if (!camera.toWorld.allFinite() || determinant == 0.0)
     throw std::runtime_error("camera: the to_world matrix cannot be inverted");
 }
 

@@ -10,6 +10,7 @@
 
 #include "runtime/core/stopwatch.h"
 #include "runtime/render/geometry/shape_geometry.h"
+#include "scenes/scene_scale.h"
 
 namespace lobe {
 namespace {
@@ -107,29 +108,6 @@ void fillInstance(RTCGeometry geometry, const Instance& instance, RTCScene group
   rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT4X4_COLUMN_MAJOR, instance.toWorld.matrix().data());
 }
 
-/// The largest absolute coordinate of ray origins: surfaces, the camera, lights, and a sphere around the scene on which
-/// photons from lights at infinity start.
-double reachOfRays(const Scene& scene, const Eigen::AlignedBox3f& bounds) {
-  Eigen::AlignedBox3f box = bounds;
-  box.extend(Vec3(scene.camera.toWorld.topRightCorner<3, 1>()));
-  for (const DeltaLight& light : scene.lights)
-    std::visit(
-        [&](const auto& l) {
-          if constexpr (requires { l.position; }) box.extend(l.position);
-        },
-        light);
-  constexpr double kSphere = 4;
-  return kSphere * box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff();
-}
-
-/// Whether rays that are transformed into the instance's group have origins and directions within Embree's limits.
-/// reach: the largest absolute coordinate of ray origins.
-bool isTraceable(const Instance& instance, double reach) {
-  constexpr double kEmbreeLimit = 1e18;
-  const Eigen::Matrix3d inverse = instance.toWorld.linear().cast<double>().inverse();
-  return inverse.cwiseAbs().rowwise().sum().maxCoeff() * std::max(1.0, reach) < kEmbreeLimit;
-}
-
 RTCGeometryType geometryType(const Shape& shape) {
   if (std::holds_alternative<TriangleMesh>(shape.geometry)) return RTC_GEOMETRY_TYPE_TRIANGLE;
   return std::holds_alternative<Instance>(shape.geometry) ? RTC_GEOMETRY_TYPE_INSTANCE : RTC_GEOMETRY_TYPE_USER;
@@ -144,6 +122,7 @@ struct RayTracer::Embree {
   std::vector<Eigen::AlignedBox3f> groupBounds;
   Eigen::AlignedBox3f bounds;
   double buildSeconds = 0;
+  float largest = kLargestInRay;  // absolute component of rays that can be traced, also in the groups of instances
 
   explicit Embree(const Scene& source) {
     if (!device) throw std::runtime_error("Embree: the device cannot be created");
@@ -156,7 +135,7 @@ struct RayTracer::Embree {
       groups.push_back(build(group.shapes));
     }
     bounds = boundsOfAll(source.shapes);
-    reach = reachOfRays(source, bounds);
+    reach = reachOfRays(source);
     scene = build(source.shapes);
   }
   Embree(const Embree&) = delete;
@@ -165,6 +144,12 @@ struct RayTracer::Embree {
     if (scene) rtcReleaseScene(scene);
     for (RTCScene group : groups) rtcReleaseScene(group);
     if (device) rtcReleaseDevice(device);
+  }
+
+  /// Whether Embree can trace the ray. Debian's aborts the program if not.
+  bool accepts(const Ray& ray) const {
+    // Each comparison is false for NaN.
+    return (ray.origin.array().abs() <= largest && ray.direction.array().abs() <= largest).all() && ray.tfar > 0.0f;
   }
 
  private:
@@ -197,7 +182,7 @@ struct RayTracer::Embree {
   bool isTooSmall(const Shape& shape, const Eigen::AlignedBox3f& shapeBox) const {
     const auto* instance = std::get_if<Instance>(&shape.geometry);
     if (!instance || isTraceable(*instance, reach)) return false;
-    if (shapeBox.sizes().maxCoeff() > 1e-6 * reach)
+    if (isResolved(shapeBox.cast<double>(), reach))
       throw std::runtime_error(fmt::format("shape \"{}\": the instance is too flat to be traced", shape.name));
     return true;
   }
@@ -207,12 +192,17 @@ struct RayTracer::Embree {
     if (const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry))
       fillMesh(geometry, *mesh);
     else if (const auto* instance = std::get_if<Instance>(&shape.geometry))
-      fillInstance(geometry, *instance, groups[instance->group]);
+      addInstance(geometry, *instance);
     else
       fillUser(geometry, shape);
     rtcCommitGeometry(geometry);
     rtcAttachGeometryByID(to, geometry, id);
     rtcReleaseGeometry(geometry);
+  }
+
+  void addInstance(RTCGeometry geometry, const Instance& instance) {
+    fillInstance(geometry, instance, groups[instance.group]);
+    largest = static_cast<float>(std::min<double>(largest, kLargestInRay / growthOfRays(instance)));
   }
 
   double reach = 0;  // the largest absolute coordinate of ray origins
@@ -230,6 +220,7 @@ double RayTracer::buildSeconds() const {
 }
 
 std::optional<Hit> RayTracer::intersect(const Ray& ray) const {
+  if (!embree_->accepts(ray)) return std::nullopt;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   RTCRayHit query{embreeRay(ray), {}};
@@ -249,6 +240,7 @@ std::optional<SurfaceHit> RayTracer::trace(const Ray& ray) const {
 }
 
 bool RayTracer::occluded(const Ray& ray) const {
+  if (!embree_->accepts(ray)) return false;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   RTCRay query = embreeRay(ray);

@@ -1,5 +1,6 @@
 #pragma once
-// Ray tracing with Embree. Rays hit both sides of every surface.
+// Ray tracing with Embree. Rays hit both sides of every surface. A ray whose origin or direction is not finite, or
+// beyond the range of Embree, hits nothing.
 
 #include <memory>
 #include <optional>

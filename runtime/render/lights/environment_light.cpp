@@ -58,7 +58,7 @@ EnvironmentLight::Coordinates EnvironmentLight::coordinates(const Vec3& directio
 
 Eigen::Vector2i EnvironmentLight::pixelOf(const Vec3& direction) const {
   const Vec2 p = coordinates(direction).point;
-  return {std::min(static_cast<int>(p.x()), width_ - 1), std::min(static_cast<int>(p.y()), height_ - 1)};
+  return {std::clamp(static_cast<int>(p.x()), 0, width_ - 1), std::clamp(static_cast<int>(p.y()), 0, height_ - 1)};
 }
 
 // Columns wrap around, rows end at the poles.
@@ -70,7 +70,7 @@ EnvironmentLight::Texel EnvironmentLight::interpolate(const Vec2& point, const S
   const float floorY = std::floor(py);
   const float fx = px - floorX;
   const float fy = py - floorY;
-  const int left = floorX < 0.0f ? width_ - 1 : std::min(static_cast<int>(floorX), width_ - 1);
+  const int left = floorX >= 0.0f ? std::min(static_cast<int>(floorX), width_ - 1) : width_ - 1;  // also for NaN
   const int right = left + 1 == width_ ? 0 : left + 1;
   const int top = std::clamp(static_cast<int>(floorY), 0, height_ - 1);
   const int bottom = std::clamp(static_cast<int>(floorY) + 1, 0, height_ - 1);
