@@ -1,12 +1,15 @@
 #pragma once
 // State shared by all parts of the reader: the file, the options, the resulting scene and the findings.
 
+#include <filesystem>
 #include <functional>
+#include <map>
 #include <string>
 #include <string_view>
 
 #include "scenes/mitsuba/reader.h"
 #include "scenes/mitsuba/scene_file.h"
+#include "scenes/mitsuba/spectra.h"
 
 namespace lobe {
 
@@ -38,6 +41,7 @@ class ReadContext {
   const ReadOptions& options;
   Scene& scene;
   Findings& findings;
+  std::map<std::filesystem::path, SpectrumFile> spectra;  ///< those that have been read
 };
 
 /// Scope in which an element is read that may contain elements of the same kind, also by reference. Throws SceneError

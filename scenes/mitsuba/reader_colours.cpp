@@ -38,22 +38,33 @@ std::optional<Rgb> parseXyz(std::string_view text) {
   return rgbOfXyz(Eigen::Vector3d(values->data()));
 }
 
-/// The spectrum in the file of this name. Throws std::runtime_error that names it.
-SpectrumPoints readSpectrumFile(const ReadContext& context, const std::string& name, std::ptrdiff_t location) {
-  const std::filesystem::path path = context.file.resolve(name, location);
-  return nameErrors(path, [&] {
-    const std::optional<SpectrumPoints> points = parseSpectrumFile(readFile(path));
-    if (!points) throw std::runtime_error("each line must have a wavelength, greater than the last, and a value");
-    return *points;
-  });
+SpectrumFile readSpectrumFile(const std::filesystem::path& path) {
+  try {
+    return nameErrors(path, [&]() -> SpectrumFile {
+      const std::optional<SpectrumPoints> points = parseSpectrumFile(readFile(path));
+      if (!points) throw std::runtime_error("each line must have a wavelength, greater than the last, and a value");
+      return {*points, ""};
+    });
+  } catch (const std::runtime_error& error) {
+    return {{}, error.what()};
+  }
 }
 
-Rgb readSpectrum(const ReadContext& context, pugi::xml_node node) {
+/// The spectrum in the file of this name, which is read once. Throws std::runtime_error that names it.
+const SpectrumPoints& spectrumFrom(ReadContext& context, const std::string& name, std::ptrdiff_t location) {
+  const auto [entry, isNew] = context.spectra.try_emplace(context.file.resolve(name, location));
+  SpectrumFile& file = entry->second;
+  if (isNew) file = readSpectrumFile(entry->first);
+  if (!file.fault.empty()) throw std::runtime_error(file.fault);
+  return file.points;
+}
+
+Rgb readSpectrum(ReadContext& context, pugi::xml_node node) {
   if (node.attribute("filename")) {
     checkAttributes(context, node, {"name", "filename", "intent"});
     try {
-      const SpectrumPoints points =
-          readSpectrumFile(context, node.attribute("filename").value(), SceneFile::location(node));
+      const SpectrumPoints& points =
+          spectrumFrom(context, node.attribute("filename").value(), SceneFile::location(node));
       return rgbOfSpectrum(points, illuminantOf(context, node));
     } catch (const std::runtime_error& error) {
       context.file.fail(node, fmt::format("<spectrum>: {}", error.what()));
@@ -125,10 +136,10 @@ std::vector<double> equallySpaced(const Parameters& parameters, std::size_t coun
   return result;
 }
 
-SpectrumPoints readCurve(const ReadContext& context, const std::string& type, const Parameters& parameters) {
+SpectrumPoints readCurve(ReadContext& context, const std::string& type, const Parameters& parameters) {
   if (parameters.has("filename")) {
     try {
-      return readSpectrumFile(context, parameters.text("filename", ""), parameters.location("filename"));
+      return spectrumFrom(context, parameters.text("filename", ""), parameters.location("filename"));
     } catch (const std::runtime_error& error) {
       throw ParameterError("filename", error.what());
     }
@@ -142,7 +153,7 @@ SpectrumPoints readCurve(const ReadContext& context, const std::string& type, co
   return *points;
 }
 
-Rgb makeCurve(const ReadContext& context, pugi::xml_node node, const std::string& type, const Parameters& parameters) {
+Rgb makeCurve(ReadContext& context, pugi::xml_node node, const std::string& type, const Parameters& parameters) {
   if (parameters.has("value"))
     return parameters.colour("value", Rgb::Zero());  // wavelength:value pairs, already converted
   return rgbOfSpectrum(readCurve(context, type, parameters), illuminantOf(context, node));
@@ -150,7 +161,7 @@ Rgb makeCurve(const ReadContext& context, pugi::xml_node node, const std::string
 
 }  // namespace
 
-std::optional<Rgb> readColour(const ReadContext& context, pugi::xml_node node) {
+std::optional<Rgb> readColour(ReadContext& context, pugi::xml_node node) {
   const std::string_view tag = elementName(node);
   if (tag == "srgb") return parsedValue<Rgb>(context, node, parseSrgb, "one or three numbers or #rrggbb");
   if (tag == "xyz") return parsedValue<Rgb>(context, node, parseXyz, "three numbers");
@@ -169,7 +180,7 @@ std::string knownSpectra() {
   return fmt::format("{}", fmt::join(kSpectra, ", "));
 }
 
-TexturePtr makeSpectrum(const ReadContext& context, pugi::xml_node node, const std::string& type,
+TexturePtr makeSpectrum(ReadContext& context, pugi::xml_node node, const std::string& type,
                         const Parameters& parameters) {
   const auto colour = [&](std::initializer_list<const char*> names) {
     return parameters.colour(nameGiven(parameters, names), Rgb::Zero());

@@ -97,22 +97,40 @@ MaterialReader::Made MaterialReader::make(pugi::xml_node node) {
                                               : Encoded::asGiven;
   int parts = 1;
   std::vector<std::uint64_t> children;
+  // A file can have more parts than an int counts.
+  const auto count = [&parts](int more) { parts = std::min(parts + more, kMostParts + 1); };
   const auto onChild = [&](pugi::xml_node child, const std::string& name, Parameters& parameters) {
-    if (elementName(child) != "bsdf") return textures_.take(child, name, parameters, encoded);
+    if (elementName(child) != "bsdf") {
+      if (!textures_.take(child, name, parameters, encoded)) return false;
+      count(textures_.partsOf(child, encoded));
+      return true;
+    }
     const Made& nested = done(child);
     parameters.addChild(nested.bsdf);
     children.push_back(nested.fingerprint);
-    parts = std::min(parts + nested.parts, kMostParts + 1);  // a file can have more than an int counts
+    count(nested.parts);
     return true;
   };
   Parameters parameters = readParameters(context_, node, "texture, bsdf, ref", onChild);
   // Evaluating the BSDF evaluates all of them, and one that is referenced twice is evaluated twice.
   if (parts > kMostParts)
-    context_.file.fail(node, fmt::format("{}: more than {} nested bsdfs", describe(node), kMostParts));
+    context_.file.fail(node, fmt::format("{}: more than {} nested bsdfs and textures", describe(node), kMostParts));
   setDefaults(type, context_.file.majorVersion(), parameters);
-  if (namesMeasurement(node) && !resolveFile(node, parameters)) return makeDiffuseOf(0.5f);
+  if (namesMeasurement(node)) {
+    if (!resolveFile(node, parameters)) return makeDiffuseOf(0.5f);
+    return makeMeasured(node, type, parameters);
+  }
   const BsdfPtr bsdf = makeFrom(context_, node, parameters, [&](const Parameters& p) { return makeBsdf(type, p); });
   return {bsdf, fingerprintOf(type, parameters, children, *bsdf), parts};
+}
+
+MaterialReader::Made MaterialReader::makeMeasured(pugi::xml_node node, const std::string& type,
+                                                  const Parameters& parameters) {
+  const std::string file = parameters.holdsText("filename") ? parameters.text("filename", "") : "";
+  const MeasuredKey key{type, file, parameters.fingerprint()};
+  if (const auto known = measured_.find(key); known != measured_.end()) return known->second;
+  const BsdfPtr bsdf = makeFrom(context_, node, parameters, [&](const Parameters& p) { return makeBsdf(type, p); });
+  return measured_.emplace(key, Made{bsdf, fingerprintOf(type, parameters, {}, *bsdf)}).first->second;
 }
 
 bool MaterialReader::resolveFile(pugi::xml_node node, Parameters& parameters) {

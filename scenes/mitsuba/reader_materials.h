@@ -2,6 +2,7 @@
 // BSDF elements of scene files, and the list of those that shapes use.
 
 #include <map>
+#include <tuple>
 
 #include "scenes/mitsuba/reader_textures.h"
 
@@ -27,7 +28,7 @@ class MaterialReader {
   struct Made {
     BsdfPtr bsdf;  ///< null while being read
     std::uint64_t fingerprint = 0;
-    int parts = 1;  ///< this BSDF and those nested in it, counted as often as they are evaluated
+    int parts = 1;  ///< this BSDF and the BSDFs and textures nested in it, counted as often as they are evaluated
   };
   /// Creates a BSDF that does not belong to an element, from its parameters, which include nested BSDFs; children: the
   /// fingerprints of those. Throws ParameterError.
@@ -40,13 +41,18 @@ class MaterialReader {
   static Made makeDiffuseOf(float reflectance);
   const Made& done(pugi::xml_node node);
   Made make(pugi::xml_node node);
+  /// A BSDF from a file, whose data it shares with an equal one that has been made before.
+  Made makeMeasured(pugi::xml_node node, const std::string& type, const Parameters& parameters);
   /// Resolves the file name relative to the scene. Returns false, after reporting a fault, when the file does not
   /// exist.
   bool resolveFile(pugi::xml_node node, Parameters& parameters);
 
   ReadContext& context_;
   TextureReader& textures_;
-  std::map<std::ptrdiff_t, Made> done_;      // by location; without a BSDF while being read
+  using MeasuredKey = std::tuple<std::string, std::string, std::uint64_t>;  // type, file, hash of the parameters
+
+  std::map<std::ptrdiff_t, Made> done_;  // by location; without a BSDF while being read
+  std::map<MeasuredKey, Made> measured_;
   Made circular_ = makeDiffuseOf(0.5f);      // replaces a BSDF inside itself
   std::map<std::ptrdiff_t, int> materials_;  // by location; the defaults at −1 and −2
   int unnamed_ = 0;

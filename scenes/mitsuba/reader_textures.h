@@ -22,6 +22,10 @@ class TextureReader {
   /// element that messages name. location: where the file is named.
   TexturePtr readFile(pugi::xml_node node, std::ptrdiff_t location, const std::filesystem::path& path, Encoded encoded);
   ImageStore& images() { return images_; }
+  /// This texture, which must have been read, and those nested in it, counted as often as they are evaluated.
+  int partsOf(pugi::xml_node node, Encoded encoded) const {
+    return done_.at({SceneFile::location(node), encoded}).parts;
+  }
 
   /// Sets the parameter if the child is a texture. Has the return value of a ChildHandler.
   bool take(pugi::xml_node child, const std::string& name, Parameters& parameters, Encoded encoded = Encoded::asGiven);
@@ -29,7 +33,7 @@ class TextureReader {
  private:
   struct Made {
     TexturePtr texture;  ///< null while being read
-    int parts = 1;       ///< this texture and those nested in it, counted as often as they are evaluated
+    int parts = 1;       ///< see partsOf
   };
   TexturePtr makeOf(pugi::xml_node node, Encoded encoded);
   TexturePtr makeFromBitmap(pugi::xml_node node, const Parameters& parameters, Encoded encoded);

@@ -305,6 +305,20 @@ TEST_CASE("scenes: small files that would expand exponentially are rejected") {
              Catch::Contains("more than 1000 nested textures"));
   CHECK(faultOf(chain("bsdf", "twosided", "diffuse", 1)).empty());
 
+  // 32 times a BSDF with 63 textures: each alone is within the limit.
+  std::string product = "<texture type=\"checkerboard\" id=\"t0\"/>";
+  for (int i = 1; i <= 5; ++i)
+    product += fmt::format(
+        "<texture type=\"checkerboard\" id=\"t{0}\"><ref name=\"color0\" id=\"t{1}\"/><ref name=\"color1\" "
+        "id=\"t{1}\"/></texture>",
+        i, i - 1);
+  product += "<bsdf type=\"diffuse\" id=\"b0\"><ref name=\"reflectance\" id=\"t5\"/></bsdf>";
+  CHECK(faultOf(product + sphere).empty());
+  for (int i = 1; i <= 5; ++i)
+    product +=
+        fmt::format("<bsdf type=\"blendbsdf\" id=\"b{0}\"><ref id=\"b{1}\"/><ref id=\"b{1}\"/></bsdf>", i, i - 1);
+  CHECK_THAT(faultOf(product + sphere), Catch::Contains("more than 1000 nested bsdfs and textures"));
+
   std::string deep;
   for (int i = 0; i < 100000; ++i)
     deep += fmt::format("<bsdf type=\"twosided\" id=\"e{}\"><ref id=\"e{}\"/></bsdf>\n", i, i + 1);
@@ -319,6 +333,20 @@ TEST_CASE("scenes: small files that would expand exponentially are rejected") {
                     i + 1));
   folder.write("40.xml", "<scene version=\"3.0.0\"/>");
   CHECK_THROWS_WITH(readScene(folder.path() / "0.xml"), Catch::Contains("more than 1000 <include>s"));
+}
+
+// Reading the file for each of them would take far longer than the time limit of a test.
+TEST_CASE("scenes: the file of a spectrum is read once") {
+  const TestFolder folder;
+  std::string lines;
+  for (int i = 1; i <= 200000; ++i) lines += fmt::format("{} 0.5\n", i);
+  folder.write("grey.spd", lines);
+  std::string body;
+  for (int i = 0; i < 50000; ++i)
+    body += "<bsdf type=\"diffuse\"><spectrum name=\"reflectance\" filename=\"grey.spd\"/></bsdf>";
+  const SceneCheck found = checkScene(folder.write("test.xml", oldSceneOf(body)));
+  CHECK(found.faults.empty());
+  CHECK(found.readable);
 }
 
 // Counting the column of each fault from the start of the line would take far longer than the time limit of a test.

@@ -149,6 +149,21 @@ TEST_CASE("scenes: measured materials are read relative to the scene and only if
   CHECK(scene.materials[0].bsdf->lobes()[0]->summary() == "paint_rgb");
 }
 
+TEST_CASE("scenes: equal measured materials share the data of their file") {
+  const TestFolder folder;
+  const auto fields = measuredFields([](const auto&, const auto&) { return grey(0.1f); }, {0.0f}, 4);
+  for (const std::string name : {"a_rgb.bsdf", "b_rgb.bsdf"}) folder.write(name, tensorFile(fields));
+  const auto sphere = [](const std::string& file) {
+    return "<shape type=\"sphere\"><bsdf type=\"measured\"><string name=\"filename\" value=\"" + file +
+           "\"/></bsdf></shape>";
+  };
+  const std::string body = sphere("a_rgb.bsdf") + sphere("a_rgb.bsdf") + sphere("b_rgb.bsdf");
+  const Scene scene = readScene(folder.write("test.xml", sceneOf(body)));
+  REQUIRE(scene.materials.size() == 3);
+  CHECK(scene.materials[0].bsdf == scene.materials[1].bsdf);
+  CHECK(scene.materials[0].bsdf != scene.materials[2].bsdf);
+}
+
 TEST_CASE("scenes: faults of measured materials are reported with their location") {
   const auto inSphere = [](const std::string& type, const std::string& parameters) {
     return "<shape type=\"sphere\">\n<bsdf type=\"" + type + "\">\n " + parameters + "</bsdf></shape>";
