@@ -20,7 +20,7 @@ std::map<std::string, TrainFrom> trainFromNames();
 
 struct TrainingPlan {
   TrainFrom from = TrainFrom::both;
-  /// Limit on photons and importons: storing what they learn takes tens of gigabytes.
+  /// Limit on photons and importons; the samples of as many take tens of gigabytes.
   static constexpr int kMostParticles = 100000000;
 
   int passes = 8;
