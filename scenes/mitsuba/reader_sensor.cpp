@@ -215,8 +215,8 @@ void readLens(const Parameters& parameters, Camera& camera) {
   constexpr double kFar = 1e4;  // Mitsuba's default focus distance is far_clip
   camera.focusDistance = static_cast<float>(parameters.number("focus_distance", parameters.number("far_clip", kFar)));
   if (!(inWorld(camera, camera.focusDistance) >= kSmallestLength))
-    throw ParameterError("focus_distance",
-                         fmt::format("focus_distance must be positive, not {}", camera.focusDistance));
+    throw ParameterError("focus_distance", fmt::format("focus_distance must be at least {:g} in the world, not {}",
+                                                       kSmallestLength, camera.focusDistance));
   if (!(camera.apertureRadius <= kLargestAperture * camera.focusDistance))
     throw ParameterError("aperture_radius",
                          fmt::format("aperture_radius must be at most {:g} times focus_distance, {}, "
