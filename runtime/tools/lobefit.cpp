@@ -190,8 +190,9 @@ void printResult(const std::vector<CacheReport>& reports, const Options& o) {
   if (!reports.empty()) printReports(reports, true, stdout);
 }
 
-/// lobes: the number of all, also of those whose caches could not be written.
+/// lobes: the number of all, also of those whose caches could not be written. If these are all, the errors say it.
 void reportSummary(const std::vector<CacheReport>& reports, std::size_t lobes, const Options& o) {
+  if (reports.empty() && lobes > 0) return;
   const auto fresh = std::ranges::count_if(reports, [](const CacheReport& r) { return !r.upToDate; });
   const std::string folder = o.compile.directory.string();
   std::string line = fmt::format("{} of {} lobes written to {}", fresh, lobes, folder);
