@@ -18,6 +18,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string_view>
+#include <system_error>
 #include <variant>
 
 #include <fmt/format.h>
@@ -276,8 +277,11 @@ Image readOther(const std::filesystem::path& path, const Encoding& encoding, Par
 }
 
 Image readPart(const std::filesystem::path& path, const Encoding& encoding, Part part) {
-  if (!std::filesystem::exists(path)) fail(path, "no such file");
-  if (!std::filesystem::is_regular_file(path)) fail(path, "not a file");
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  if (status.type() == std::filesystem::file_type::not_found) fail(path, "no such file");
+  if (status.type() == std::filesystem::file_type::none) fail(path, error.message());
+  if (!is_regular_file(status)) fail(path, "not a file");
   if (!isExrFile(path)) return readOther(path, encoding, part);
   return *readExr(path,
                   [&](const Imf::ChannelList& channels) { return std::optional(exrChannels(path, channels, part)); });
