@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -71,7 +72,8 @@ std::string difference(const LobeCacheInfo& have, const LobeCacheInfo& want, con
 }
 
 void check(CompileJob& job, bool force) {
-  if (!std::filesystem::exists(job.path)) return;
+  std::error_code error;  // of names that the system refuses, which writing reports
+  if (!std::filesystem::exists(job.path, error)) return;
   try {
     job.stale = force ? "--force" : difference(LobeCache::open(job.path).info(), job.info, *job.use.lobe);
     job.upToDate = job.stale.empty();

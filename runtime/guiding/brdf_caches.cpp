@@ -6,6 +6,7 @@
 #include <map>
 #include <numbers>
 #include <stdexcept>
+#include <system_error>
 #include <tuple>
 
 #include <fmt/format.h>
@@ -28,7 +29,9 @@ std::span<const Gaussian> asGaussians(std::span<const CacheComponent> components
 /// Opens the file of a lobe; throws std::runtime_error if it is missing, damaged or stale.
 LobeCache openFor(const std::filesystem::path& folder, const LobeRequest& request) {
   const std::filesystem::path path = folder / lobeFileName(request.model, request.key);
-  if (!std::filesystem::exists(path)) throw std::runtime_error(path.string() + ": missing");
+  std::error_code error;
+  if (!std::filesystem::exists(path, error))
+    throw std::runtime_error(fmt::format("{}: {}", path.string(), error ? error.message() : "missing"));
   LobeCache cache = LobeCache::open(path);
   if (cache.info().key != request.key || cache.info().modelRevision != request.revision)
     throw std::runtime_error(path.string() + ": stale, it was fitted for another version of the lobe");

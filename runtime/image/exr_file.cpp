@@ -1,9 +1,11 @@
 #include "runtime/image/exr_file.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
+#include <cstring>
 #include <stdexcept>
-#include <string>
+#include <string_view>
 #include <type_traits>
 
 #include <fmt/format.h>
@@ -15,11 +17,21 @@
 namespace lobe {
 namespace {
 
-/// Keeps the first fault.
-void keepFault(exr_const_context_t context, exr_result_t, const char* message) {
-  void* fault = nullptr;
-  if (context && exr_get_user_data(context, &fault) == EXR_ERR_SUCCESS && fault)
-    if (auto& text = *static_cast<std::string*>(fault); text.empty()) text = message;
+/// The first fault, without memory of its own: it is set in a callback of a library in C.
+using Fault = std::array<char, 256>;
+
+/// OpenEXRCore only warns of these, and Imf::InputFile would allocate memory for a wrong size, or use another copy of
+/// the attribute. It checks the size of previews itself.
+bool isHarmful(exr_result_t code, std::string_view message) {
+  return (code == EXR_ERR_ATTR_SIZE_MISMATCH && message.find("preview") == message.npos) ||
+         message.starts_with("Duplicate copy of required attribute");
+}
+
+void keepFault(exr_const_context_t context, exr_result_t code, const char* message) {
+  void* data = nullptr;
+  if (!context || exr_get_user_data(context, &data) != EXR_ERR_SUCCESS || !data || !isHarmful(code, message)) return;
+  auto& fault = *static_cast<Fault*>(data);
+  if (fault[0] == 0) std::strncpy(fault.data(), message, fault.size() - 1);
 }
 
 struct Finish {
@@ -45,11 +57,12 @@ void checkDataWindow(const std::filesystem::path& path, exr_const_context_t file
 
 /// Pixels of the display window outside the data window take no bytes.
 void checkDisplayWindow(const std::filesystem::path& path, const Size& data, const Size& display) {
-  constexpr std::int64_t kMostPerPixel = 16;
+  // Enough for cropped frames of 8192 x 8192 pixels.
+  constexpr std::int64_t kHarmless = std::int64_t{1} << 26, kMostPerPixel = 16;
   checkPixelCount(path, display.width, display.height);
-  if (display.width * display.height > std::max(kHarmlessPixels, kMostPerPixel * data.width * data.height))
+  if (display.width * display.height > std::max(kHarmless, kMostPerPixel * data.width * data.height))
     throw std::runtime_error(
-        fmt::format("{}: its display window of {}x{} pixels is over the limit of 2^24 pixels or {} times those of the "
+        fmt::format("{}: its display window of {}x{} pixels is over the limit of 2^26 pixels or {} times those of the "
                     "data window, which has {}x{}",
                     path.string(), display.width, display.height, kMostPerPixel, data.width, data.height));
 }
@@ -81,17 +94,34 @@ void checkBlocks(const std::filesystem::path& path, exr_const_context_t file, st
                     path.string(), bytes, limit, length));
 }
 
-/// OpenEXRCore reports sizes of attributes that do not fit the file or the type, which Imf::InputFile does not.
-void checkHeader(const std::filesystem::path& path) {
-  std::string fault;
+Context openHeader(const std::filesystem::path& path) {
+  Fault fault{};
   exr_context_initializer_t options = EXR_DEFAULT_CONTEXT_INITIALIZER;
   options.error_handler_fn = keepFault;
   options.user_data = &fault;
   exr_context_t opened = nullptr;
   const exr_result_t result = exr_start_read(&opened, path.c_str(), &options);
-  const Context context(opened);
-  if (result != EXR_ERR_SUCCESS && fault.empty()) fault = exr_get_default_error_message(result);
-  if (!fault.empty()) throw std::runtime_error(fmt::format("{}: damaged EXR file ({})", path.string(), fault));
+  Context context(opened);
+  if (result == EXR_ERR_OUT_OF_MEMORY) throw OutOfMemory(path);
+  if (result == EXR_ERR_SUCCESS && fault[0] == 0) return context;
+  const char* reason = fault[0] == 0 ? exr_get_default_error_message(result) : fault.data();
+  throw std::runtime_error(fmt::format("{}: {} ({})", path.string(),
+                                       result == EXR_ERR_FILE_ACCESS ? "cannot read" : "damaged EXR file", reason));
+}
+
+/// Deep images take memory for as many samples as their pixels claim.
+void checkStorage(const std::filesystem::path& path, exr_const_context_t file) {
+  exr_storage_t storage{};
+  exr_get_storage(file, 0, &storage);
+  if (storage == EXR_STORAGE_DEEP_SCANLINE || storage == EXR_STORAGE_DEEP_TILED)
+    throw std::runtime_error(fmt::format("{}: deep EXR images are not supported", path.string()));
+}
+
+/// OpenEXRCore reports sizes of attributes that do not fit the file or the type, which Imf::InputFile does not.
+void checkHeader(const std::filesystem::path& path) {
+  const Context context = openHeader(path);
+  const exr_context_t opened = context.get();
+  checkStorage(path, opened);
   exr_attr_box2i_t data{}, display{};
   // Imf::InputFile reads the first part.
   exr_get_data_window(opened, 0, &data);

@@ -7,6 +7,7 @@
 #include <set>
 #include <sstream>
 #include <stdexcept>
+#include <system_error>
 #include <tuple>
 
 #include <fmt/format.h>
@@ -92,7 +93,8 @@ std::vector<SampleRange> rangesOf(const std::filesystem::path& path, const Image
 }
 
 Part describe(const std::filesystem::path& path) {
-  if (!std::filesystem::exists(path)) throw std::runtime_error(path.string() + ": no such file");
+  std::error_code error;  // of names that the system refuses, which reading reports
+  if (!std::filesystem::exists(path, error) && !error) throw std::runtime_error(path.string() + ": no such file");
   Part part{path, readAttributes(path), 0, {}};
   const std::optional<std::uint64_t> samples = findCount(part.attributes, "samples");
   if (const auto interrupted = find<std::string>(part.attributes, "interrupted"))

@@ -3,23 +3,14 @@
 #include <algorithm>
 #include <set>
 #include <stdexcept>
-#include <system_error>
 
 #include <fmt/format.h>
 
 #include "runtime/core/files.h"
+#include "scenes/mitsuba/file_search.h"
 #include "scenes/mitsuba/reader_parameters.h"
 
 namespace lobe {
-namespace {
-
-bool isThere(const std::filesystem::path& path) {
-  std::error_code error;
-  return std::filesystem::exists(path, error);
-}
-
-}  // namespace
-
 std::vector<std::pair<std::string, int>> ObjMaterialReader::read(pugi::xml_node shape, std::ptrdiff_t location,
                                                                  const MeshSource& source) {
   const ObjMaterials found = find(location, source);
@@ -56,12 +47,12 @@ std::filesystem::path ObjMaterialReader::resolve(const Place& place, std::string
   std::ranges::replace(name, '\\', '/');
   const std::filesystem::path bare = std::filesystem::path(name).filename();
   for (const std::filesystem::path& candidate : {std::filesystem::path(name), bare}) {
-    if (isThere(place.folder / candidate)) {
+    if (pathExists(place.folder / candidate)) {
       context_.findings.addFile(place.folder / candidate);
       return place.folder / candidate;
     }
     std::filesystem::path elsewhere = context_.file.resolve(candidate.string(), place.location);
-    if (isThere(elsewhere)) return elsewhere;
+    if (pathExists(elsewhere)) return elsewhere;
   }
   return context_.file.resolve((place.folder / name).string(), place.location);
 }
@@ -75,7 +66,7 @@ ObjMaterialReader::Library ObjMaterialReader::readLibrary(const Place& place) co
   const std::string what = fmt::format("{}: material library", describe(place.shape));
   Library library;
   try {
-    if (!isThere(place.library)) throw std::runtime_error(place.library.string() + ": no such file");
+    if (!pathExists(place.library)) throw std::runtime_error(place.library.string() + ": no such file");
     const std::string text = textOf(place.location, place.library, what);
     for (MtlMaterial& material : nameErrors(place.library, [&] { return parseMtl(text); }))
       library[material.name] = std::move(material);
@@ -152,7 +143,7 @@ MaterialReader::Made ObjMaterialReader::wrap(const Place& place, const MtlMateri
 
 TexturePtr ObjMaterialReader::texture(const Place& place, const std::string& file, Encoded encoded) {
   const std::filesystem::path path = resolve(place, file);
-  if (isThere(path)) return textures_.readFile(place.shape, place.location, path, encoded);
+  if (pathExists(path)) return textures_.readFile(place.shape, place.location, path, encoded);
   context_.warn(place.location, "missing image " + path.string(),
                 fmt::format("{}: {}: image {} does not exist: black is used", describe(place.shape),
                             place.library.string(), path.string()));

@@ -1,5 +1,6 @@
 // Image files of all formats: their pixels, and what is reported about damaged files.
 
+#include <array>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
@@ -8,9 +9,13 @@
 #include <vector>
 
 #include <ImfChannelList.h>
+#include <ImfDeepScanLineOutputFile.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
+#include <ImfIntAttribute.h>
 #include <ImfOutputFile.h>
+#include <ImfPartType.h>
+#include <ImfPreviewImageAttribute.h>
 #include <ImfTileDescription.h>
 #include <ImfTiledOutputFile.h>
 #include <catch2/catch.hpp>
@@ -198,10 +203,36 @@ TEST_CASE("materials: a display window far larger than the data window of an EXR
   const std::filesystem::path path = folder / "a.exr";
   writeExr(path, {"R", "G", "B"}, Imf::FLOAT, box(0, 0, 11584, 11584), box(0, 0, 39, 39), Imf::NO_COMPRESSION);
   CHECK_THAT(faultOfReading([&] { readImage(path); }),
-             Contains("a.exr: its display window of 11585x11585 pixels is over the limit of 2^24 pixels or 16 times "
+             Contains("a.exr: its display window of 11585x11585 pixels is over the limit of 2^26 pixels or 16 times "
                       "those of the data window, which has 40x40"));
   writeExr(path, {"Y"}, Imf::HALF, box(0, 0, 1999, 999), box(0, 0, 0, 0));
   CHECK(readImage(path).width == 2000);
+}
+
+TEST_CASE("materials: EXR files with faults that do not concern their pixels are read, and deep ones are not") {
+  const Folder folder;
+  Imf::Header header(2, 1);
+  header.channels().insert("Y", Imf::Channel(Imf::FLOAT));
+  const std::array<float, 2> values{1, 2};
+  const auto write = [&](const std::string& name) {
+    Imf::FrameBuffer frame;
+    frame.insert("Y", Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(const_cast<float*>(values.data())), 4, 8));
+    Imf::OutputFile file((folder / name).c_str(), header);
+    file.setFrameBuffer(frame);
+    file.writePixels(1);
+  };
+  header.insert("chunkCount", Imf::IntAttribute(7));
+  header.insert("version", Imf::IntAttribute(2));
+  header.insert("preview", Imf::PreviewImageAttribute(Imf::PreviewImage(0, 0)));
+  write("a.exr");
+  CHECK(readImage(folder / "a.exr").at(1, 0).x() == 2);
+
+  Imf::Header deep(2, 1);
+  deep.channels().insert("Y", Imf::Channel(Imf::FLOAT));
+  deep.setType(Imf::DEEPSCANLINE);
+  deep.compression() = Imf::NO_COMPRESSION;
+  { const Imf::DeepScanLineOutputFile file((folder / "deep.exr").c_str(), deep); }
+  CHECK_THAT(faultOfReading([&] { readImage(folder / "deep.exr"); }), Contains("deep EXR images are not supported"));
 }
 
 TEST_CASE("materials: the blocks in which an EXR file is compressed are limited in size") {

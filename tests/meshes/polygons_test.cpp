@@ -257,9 +257,9 @@ TEST_CASE("scenes: maxSmoothAngle takes a limited number of comparisons") {
     }
     return readObj(folder.write("cone.obj", cone), smoothUpTo(0));
   };
-  CHECK(read(4000).positions.size() == 3 * 4000);
-  CHECK_THAT(faultOfReading([&] { read(9000); }),
-             Contains("cone.obj: ") && Contains("more than 1000 comparisons for each of its 27000 corners"));
+  CHECK(read(9000).positions.size() == 3 * 9000);
+  CHECK_THAT(faultOfReading([&] { read(60000); }),
+             Contains("cone.obj: ") && Contains("more than 1000 comparisons for each of its 180000 corners"));
 }
 
 TEST_CASE("scenes: the normals of an OBJ are smooth within its groups as in Mitsuba") {

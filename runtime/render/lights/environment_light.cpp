@@ -6,6 +6,11 @@
 namespace lobe {
 namespace {
 
+/// The cell of n that contains x, or the nearest one; the first for NaN.
+int cellOf(float x, int n) {
+  return x >= 0.0f ? std::min(static_cast<int>(x), n - 1) : 0;
+}
+
 Rgb usable(const Rgb& c) {
   Rgb result = c;
   for (float& value : result)
@@ -58,7 +63,7 @@ EnvironmentLight::Coordinates EnvironmentLight::coordinates(const Vec3& directio
 
 Eigen::Vector2i EnvironmentLight::pixelOf(const Vec3& direction) const {
   const Vec2 p = coordinates(direction).point;
-  return {std::clamp(static_cast<int>(p.x()), 0, width_ - 1), std::clamp(static_cast<int>(p.y()), 0, height_ - 1)};
+  return {cellOf(p.x(), width_), cellOf(p.y(), height_)};
 }
 
 // Columns wrap around, rows end at the poles.
@@ -72,8 +77,8 @@ EnvironmentLight::Texel EnvironmentLight::interpolate(const Vec2& point, const S
   const float fy = py - floorY;
   const int left = floorX >= 0.0f ? std::min(static_cast<int>(floorX), width_ - 1) : width_ - 1;  // also for NaN
   const int right = left + 1 == width_ ? 0 : left + 1;
-  const int top = std::clamp(static_cast<int>(floorY), 0, height_ - 1);
-  const int bottom = std::clamp(static_cast<int>(floorY) + 1, 0, height_ - 1);
+  const int top = cellOf(floorY, height_);
+  const int bottom = cellOf(floorY + 1.0f, height_);
   const auto value = [&](int x, int y) {
     Texel result = texel(x, y);
     result.w() *= scale(x, y);
