@@ -7,6 +7,7 @@ Exits with 77 if Matplotlib is not installed.
 
 import csv
 import hashlib
+import itertools
 import json
 import os
 import pathlib
@@ -51,8 +52,8 @@ def make_tools(folder):
         (folder / name).chmod(0o755)
 
 
-def run(script, *arguments, code=0, **environment):
-    done = subprocess.run([str(part) for part in (ROOT / "scripts" / script, *arguments)], capture_output=True, text=True,
+def run(script, *arguments, code=0, cwd=None, **environment):
+    done = subprocess.run([str(part) for part in (ROOT / "scripts" / script, *arguments)], capture_output=True, text=True, cwd=cwd,
                           env=os.environ | {"CACHE": "first", "SCENE_HASH": "0a"} | environment)
     assert done.returncode == code, f"{script} exits with {done.returncode}: {done.stdout}{done.stderr}"
     return done.stdout if code == 0 else done.stderr
@@ -115,6 +116,7 @@ def check_refused(folder):
         assert all(after[path] == content for path, content in before.items()), "something is overwritten"
 
     refused("with other caches", CACHE="second")
+    refused("the lobe cannot be fitted", CACHE="broken")
     refused("with the options --size 320x200 --seconds 8 --seed 1 --integrator path, not --size 320x200 --seconds 8 --seed 1 --threads 1 ",
             "--threads", "1")
     refused("files of the scene have changed", "--seeds", "1", "2", "3", SCENE_HASH="0b")
@@ -122,7 +124,8 @@ def check_refused(folder):
     of_path = out / "runs" / SCENE / "a_path-s8-1"
     record, statistics = pathlib.Path(f"{of_path}.run"), pathlib.Path(f"{of_path}.json")
     for file, text, changes in ((record, "on 1000 cores, not ", {"cores": 1000}), (record, "on another machine, none, not ", {"cpu": "none"}),
-                                (record, "by another loberender", {"loberender": "0"}),
+                                (record, "by another loberender", {"loberender": "0"}), (record, "of another scene file", {"scene": "0"}),
+                                (record, "with --jobs 2, not 1", {"jobs": 2}),
                                 (statistics, "files of the scene have changed", {"scene_hash": "0b"})):
         edit(file, **changes)
         of_other, before[file] = before[file], file.read_bytes()
@@ -151,19 +154,37 @@ def check_continued(folder):
     assert repeated == {missing.name}, repeated
 
 
+def interrupt(number, arguments, picture):
+    """Sends the signal as soon as the picture is written."""
+    environment = os.environ | {"CACHE": "first", "SCENE_HASH": "0a", "RENDER_SECONDS": "60"}
+    process = subprocess.Popen([str(part) for part in arguments], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while not picture.exists():
+        assert process.poll() is None, f"the run is not begun: {process.stderr.read()}"
+        time.sleep(0.02)
+    time.sleep(0.1)  # until its statistics are written
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=20)  # not those of the tools
+    assert process.returncode == 128 + number, (process.returncode, errors)
+    *_, progress, message = errors.splitlines()
+    assert " of 6 runs" in progress and message == "interrupted; run the same command again to continue", errors
+
+
 def check_interrupted(folder):
     out = folder / "interrupted"
-    arguments = [str(part) for part in (ROOT / "scripts/evaluate", out, *command(folder)[1:], "--jobs", "2")]
-    environment = os.environ | {"CACHE": "first", "SCENE_HASH": "0a", "RENDER_SECONDS": "60"}
-    for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
-        process = subprocess.Popen(arguments, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        while "0 of 6 runs" not in process.stderr.readline():
-            assert process.poll() is None, "no runs are begun"
-        time.sleep(0.3)  # until the tools are started
-        process.send_signal(number)
-        _, errors = process.communicate(timeout=20)  # not those of the tools
-        assert process.returncode == code, (process.returncode, errors)
-        assert errors == "interrupted; run the same command again to continue\n", errors
+    for number, jobs in ((signal.SIGTERM, 2), (signal.SIGINT, 2)):
+        picture = out / "runs" / SCENE / "a_path-s8-1.exr"
+        picture.unlink(missing_ok=True)
+        interrupt(number, [ROOT / "scripts/evaluate", out, *command(folder)[1:], "--jobs", jobs], picture)
+
+
+def check_repeated(folder):
+    """A run that is repeated is not complete before its end, although it was."""
+    picture = folder / "out/runs" / SCENE / "a_path-s8-2.exr"
+    picture.unlink()
+    interrupt(signal.SIGTERM, [ROOT / "scripts/evaluate", *command(folder)], picture)
+    before = picture.stat().st_mtime_ns
+    run("evaluate", *command(folder))
+    assert picture.stat().st_mtime_ns != before, "an interrupted run is taken for a complete one"
 
 
 def check_progress(folder):
@@ -187,14 +208,40 @@ def check_progress(folder):
 def check_pairs(folder):
     """All pairs of seeds count."""
     arguments = [folder / "pairs", *command(folder)[1:], "--seeds", "1", "2", "3"]
-    for growth, value, spread in (("0.5", 0.03, 0.01), ("0.01", 0.0202, 0.0002)):
+    # The jackknife's means without one seed are the single pairs: 0.02, 0.03 and 0.04.
+    for growth, value, spread in (("0.5", 0.03, (2 / 3 * 2 * 0.01 ** 2) ** 0.5), ("0.01", 0.0202, (2 / 3 * 2 * 0.0002 ** 2) ** 0.5)):
         run("evaluate", *arguments, RANGE=growth)
         assert [row["seeds"] for row in rows_of(folder / "pairs/errors.csv")][:3] == ["1 2", "1 3", "2 3"]
         of_path = next(one for one in results.read_summary(folder / "pairs") if one["method"] == "a:path")
         assert of_path["pairs"] == 3, of_path
         assert abs(of_path["trimmed"] - value) < 1e-9 and abs(of_path["trimmed_spread"] - spread) < 1e-9, of_path
-    tiny = {"trimmed": 1, "trimmed_low": None, "trimmed_high": None}
-    assert results.load_evaluate().uncertainty([tiny], "trimmed") is None, "an uncertainty of 0"
+    uncertainty = results.load_evaluate().uncertainty
+    tiny = {"trimmed": 1, "trimmed_low": None, "trimmed_high": None, "seeds": "1 2"}
+    assert uncertainty([tiny], "trimmed") is None, "an uncertainty of 0"
+    # Without seed i, the mean over the pairs is that of the sums of two of the other three seeds, (36 - i) * 2 / 3.
+    pairs = [{"seeds": f"{a} {b}", "trimmed": a + b} for a, b in itertools.combinations((1, 5, 12, 18), 2)]
+    means = [(36 - seed) * 2 / 3 for seed in (1, 5, 12, 18)]
+    expected = (3 / 4 * sum((mean - sum(means) / 4) ** 2 for mean in means)) ** 0.5
+    assert abs(uncertainty(pairs, "trimmed") - expected) < 1e-12, (uncertainty(pairs, "trimmed"), expected)
+
+
+def check_plan_last(folder):
+    """The plan stays that of the tables if these cannot be written."""
+    out = folder / "pairs"
+    plan, errors = (out / "plan.json").read_bytes(), (out / "errors.csv").read_bytes()
+    (out / "errors.csv.tmp").mkdir()
+    assert "errors.csv.tmp" in run("evaluate", out, *command(folder)[1:], "--seeds", "1", "2", code=1)
+    assert (out / "plan.json").read_bytes() == plan and (out / "errors.csv").read_bytes() == errors
+    (out / "errors.csv.tmp").rmdir()
+
+
+def check_black(folder):
+    """The means of methods are relative to that of all, whichever of them is black."""
+    tools, out = folder / "tools", folder / "black"
+    arguments = ["--scenes", SCENE, "--seconds", "8", "--methods", "--method", "black=--max-depth 1", "--method"]
+    # Tools of the current folder are not looked for in PATH.
+    run("evaluate", out, *arguments, "other=--integrator path", "--build", "a=.", cwd=tools)
+    assert {one["method"]: one["relative_mean"] for one in results.read_summary(out)} == {"a:black": 0, "a:other": 2}
 
 
 def check_usage(folder):
@@ -223,6 +270,7 @@ def check_usage(folder):
     wrong("there is nothing to evaluate", new, "--scenes", SCENE, "--methods", "--build", f"a={folder / 'tools'}")
     wrong("kitchen/scene.xml: no such scene file", new, "--scenes", "kitchen", LOBE_DATA=str(folder))
     assert not new.exists()
+    wrong("tools/lobefit is not a folder", folder / "tools/lobefit", *command(folder)[1:])
 
 
 def write_exr(path, width, height):
@@ -241,6 +289,9 @@ def check_import(folder):
 
     wrong("has no pictures SCENE-SEED.exr")
     pictures = [peer / f"{SCENE}-{seed}.exr" for seed in (1, 2)]
+    pictures[0].mkdir()
+    wrong("Is a directory")
+    pictures[0].rmdir()
     write_exr(pictures[0], 320, 200)
     one = subprocess.run([str(part) for part in (ROOT / "scripts/evaluate", folder / "one", *command(folder, "--import", "peer", peer)[1:])],
                          capture_output=True, text=True, env=os.environ | {"CACHE": "first", "SCENE_HASH": "0a"})
@@ -426,9 +477,9 @@ def main():
     with tempfile.TemporaryDirectory(prefix="lobe-evaluate-") as name:
         folder = pathlib.Path(name)
         make_tools(folder / "tools")
-        for check in (check_plan, check_refused, check_continued, check_interrupted, check_progress, check_pairs, check_usage, check_import,
-                      check_import_only, check_markdown, check_comparison, check_comparison_usage, check_charts, check_long_run,
-                      check_missing_errors, check_reference, check_made_references):
+        for check in (check_plan, check_refused, check_continued, check_interrupted, check_repeated, check_progress, check_pairs,
+                      check_plan_last, check_black, check_usage, check_import, check_import_only, check_markdown, check_comparison,
+                      check_comparison_usage, check_charts, check_long_run, check_missing_errors, check_reference, check_made_references):
             check(folder)
             print(check.__name__, "passed", flush=True)
     return 0

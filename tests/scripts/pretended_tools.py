@@ -1,11 +1,13 @@
 """Tools that only pretend to fit, render and compare, for evaluate_test.py. CACHE is the content of every cache, SCENE_HASH the hash of every
 scene, RENDER_SECONDS how long a picture takes. RANGE is how much the relative variance of a pair grows with the sum of its seeds. FIRST_RELMSE
-is the error of the first snapshots. The pictures of a peer are darker."""
+is the error of the first snapshots. The pictures of a peer are darker, and those of the method black are black. Caches that are broken
+cannot be fitted."""
 
 import json
 import os
 import pathlib
 import struct
+import sys
 import time
 import zlib
 
@@ -37,6 +39,8 @@ def lobefit(arguments):
     file = pathlib.Path(arguments[arguments.index("-o") + 1]) / "a.lobe"
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(os.environ["CACHE"])
+    if os.environ["CACHE"] == "broken":
+        sys.exit("the lobe cannot be fitted")
     print(json.dumps([{"file": str(file), "lobe": "a", "up_to_date": False, "seconds": 0.1}]))
 
 
@@ -52,7 +56,10 @@ def lobecompare(arguments):
     pictures = [word for word in arguments if not word.startswith("--")]
     if "--pair" not in arguments:
         relmse = {picture: float(os.environ.get("FIRST_RELMSE", 0.02)) if picture.endswith("-0.exr") else 0.02 for picture in pictures}
-        return print(json.dumps([{"relmse": relmse[picture], "mean_ratio": 0.7 if "/peer/" in picture else 1} for picture in pictures[1:]]))
+        means = {picture: 0 if "/a_black-" in picture else 0.7 if "/peer/" in picture else 1 for picture in pictures}
+        reference = means[pictures[0]]
+        return print(json.dumps([{"relmse": relmse[picture], "mean_ratio": means[picture] / reference if reference else None}
+                                 for picture in pictures[1:]]))
     seeds = sum(int(pathlib.Path(picture).stem.rpartition("-")[2]) for picture in pictures)
     value = 0.02 if "/a_path-" in pictures[0] or "/path/" in pictures[0] else 0.0118 if "/a_method-" in pictures[0] else 0.01
     value *= 1 + float(os.environ.get("RANGE", "0")) * (seeds - 3)
