@@ -124,9 +124,10 @@ def check_pointer(driver, scene):
     def state():
         return right.value_of_css_property("clip-path"), bar.get_attribute("value"), window.get_attribute("style")
 
-    before, quarter = state(), slider.size["width"] // 4
+    before, quarter, crop = state(), slider.size["width"] // 4, scene.find_element(By.CSS_SELECTOR, ".crops figure")
     ActionChains(driver).move_to_element(slider).click_and_hold().move_by_offset(-quarter, 0).release().perform()
     after = state()
+    assert crop.is_displayed(), "crops are made again while the edge is dragged"
     assert after[:2] != before[:2] and 24 <= int(after[1]) <= 26 and after[2] == before[2], (before, after)
     ActionChains(driver).move_to_element_with_offset(slider, quarter, 0).click().perform()
     assert state()[:2] == after[:2] and state()[2] != after[2], (after, state())
