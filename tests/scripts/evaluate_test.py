@@ -165,8 +165,7 @@ def interrupt(number, arguments, picture):
     process.send_signal(number)
     _, errors = process.communicate(timeout=20)  # not those of the tools
     assert process.returncode == 128 + number, (process.returncode, errors)
-    *_, progress, message = errors.splitlines()
-    assert " of 6 runs" in progress and message == "interrupted; run the same command again to continue", errors
+    assert errors.splitlines()[-1] == "interrupted; run the same command again to continue" and "Traceback" not in errors, errors
 
 
 def check_interrupted(folder):
@@ -383,6 +382,7 @@ def check_comparison_usage(folder):
     script = runpy.run_path(str(ROOT / "scripts/draw-comparison"))
     assert [script["caption"]("path", {"trimmed": value, "budget": "seconds 8"})[1] for value in (0.0603, 0.061, 1.0, 12)] == \
         ["variance 0.060", "variance 0.061", "variance 1.0", "variance 12"]
+    assert script["cut"](numpy.arange(40).reshape(4, 10), (0.999, 0.999, 0.001, 0.001)).tolist() == [[39]], "not the last pixel"
     assert script["enlarged"](numpy.arange(40).reshape(4, 10), 5).tolist() == [[11, 13, 15, 17, 19], [31, 33, 35, 37, 39]]
 
 
@@ -439,10 +439,23 @@ def check_reference(folder):
     references = folder / "references"
     references.mkdir()
     reference = references / "livingroom.exr"
-    assert "no such file" in run("bench-long-run", folder / "long", SCENE, "2", "--reference", reference, code=2)
+
+    def wrong(text, *more):
+        errors = run("bench-long-run", folder / "wrong", SCENE, "2", "--reference", reference, "--tools", folder / "tools", *more, code=2)
+        assert text in errors and "Traceback" not in errors, errors
+        assert not (folder / "wrong").exists(), "something is rendered"
+
+    wrong("No such file")
     reference.write_text("picture")
+    wrong("is not an EXR file")
+    write_exr(reference, 64, 40)
+    wrong("has 64x40 pixels, not 32x20", "--size", "32x20")
+    (references / "references.json").write_text("[{")
+    wrong("references.json")
+    (references / "references.json").unlink()
     _, errors = errors_of_long_run(folder, "--reference", reference)
     assert set(map(float, errors)) == {0.02}, errors
+    assert "--size 64x40" in (folder / "long/bdpt-gradients-1.exr").read_text(), "not the size of the reference"
     (references / "references.json").write_text(json.dumps([{"scene": "livingroom", "reference": "bdpt", "methods": {"bdpt": {"relvar": 0.005}}}]))
     _, errors = errors_of_long_run(folder, "--reference", reference)
     assert all(abs(float(error) - 0.015) < 1e-9 for error in errors), errors
@@ -460,17 +473,44 @@ def check_made_references(folder):
         {"scene": sha256(scene), "caches": {"a.lobe": sha256(out / "room/caches/a.lobe")}}, one
     assert one["version"] == "loberender 0.0.0" and one["threads"] is None and one["methods"]["vcm"]["scene_hash"] == "0a", one
     assert one["machine"]["cores"] == len(os.sched_getaffinity(0)) and one["methods"]["vcm"]["options"] == ["--integrator", "vcm"], one
-    assert "with other caches" in run("make-references", *command, code=1, CACHE="second")
     for file in (scene, tools / "loberender"):
         content = file.read_bytes()
         file.write_bytes(content + b"\n")
-        assert "by other tools, of another scene" in run("make-references", *command, code=1), file
+        assert "by other tools, of another scene" in run("make-references", *command, code=1, CACHE="second"), file
+        assert (out / "room/caches/a.lobe").read_text() == "first", "lobefit is run before"
         file.write_bytes(content)
+    assert "with other caches" in run("make-references", *command, code=1, CACHE="second")
     errors = run("make-references", *command, "--runs", "5", code=1, SCENE_HASH="0b")
     assert "files of the scene have changed" in errors, errors
     assert (out / "references.json").read_text() == table, "the table is not that of the reference"
     errors = run("make-references", *command, "--methods", "vcm", "cut=--integrator path --firefly-limit 1", code=2)
     assert "at least one method without a bias" in errors, errors
+
+
+def check_resumed_references(folder):
+    """Interrupted runs are ended, and continued from checkpoints that are known to be theirs."""
+    tools, scene, out = folder / "tools", ROOT / "scenes/livingroom.xml", folder / "resumed"
+    command = [out, scene, "--spp", "1", "--runs", "4", "--methods", "path", "bdpt", "--tools", tools]
+    picture = out / "livingroom/path/1.exr"
+    begun, checkpoint = picture.with_suffix(".begun"), picture.with_suffix(".ckpt")
+    for number in (signal.SIGTERM, signal.SIGINT):
+        picture.unlink(missing_ok=True)
+        interrupt(number, [ROOT / "scripts/make-references", *command], picture)
+        commands = [path.read_bytes() for path in pathlib.Path("/proc").glob("[0-9]*/cmdline") if os.access(path, os.R_OK)]
+        assert not any(str(picture).encode() in words for words in commands), "loberender goes on"
+    checkpoint.write_text("state")
+    content = begun.read_text()
+    edit(begun, loberender="0")
+    assert "1.begun was made by another command, by other tools" in run("make-references", *command, code=1, CACHE="second")
+    assert (out / "livingroom/caches/a.lobe").read_text() == "first", "lobefit is run before"
+    begun.write_text(content)
+    run("make-references", *command)
+    assert f"--resume {checkpoint}" in picture.read_text() and not begun.exists() and not checkpoint.exists()
+    # Nothing is known of this checkpoint.
+    picture.with_suffix(".run").unlink()
+    checkpoint.write_text("state")
+    run("make-references", *command)
+    assert "--resume" not in picture.read_text()
 
 
 def main():
@@ -479,7 +519,8 @@ def main():
         make_tools(folder / "tools")
         for check in (check_plan, check_refused, check_continued, check_interrupted, check_repeated, check_progress, check_pairs,
                       check_plan_last, check_black, check_usage, check_import, check_import_only, check_markdown, check_comparison,
-                      check_comparison_usage, check_charts, check_long_run, check_missing_errors, check_reference, check_made_references):
+                      check_comparison_usage, check_charts, check_long_run, check_missing_errors, check_reference, check_made_references,
+                      check_resumed_references):
             check(folder)
             print(check.__name__, "passed", flush=True)
     return 0

@@ -72,7 +72,7 @@ def check_resumed(tools, out):
         time.sleep(0.02)
     interrupted.send_signal(signal.SIGINT)
     text, errors = interrupted.communicate()
-    assert interrupted.returncode == 1 and "interrupted; the same command goes on" in errors, text + errors
+    assert interrupted.returncode == 130 and "interrupted; run the same command again to continue" in errors, text + errors
     assert checkpoint.exists() and not complete_runs(out), "the first run was over before it was interrupted"
     state = checkpoint.read_bytes()
     checkpoint.write_bytes(state[:100])
