@@ -506,11 +506,12 @@ def check_resumed_references(folder):
     begun.write_text(content)
     run("make-references", *command)
     assert f"--resume {checkpoint}" in picture.read_text() and not begun.exists() and not checkpoint.exists()
-    # Nothing is known of this checkpoint.
+    # Nothing is known of this checkpoint, neither now nor later.
     picture.with_suffix(".run").unlink()
+    picture.unlink()
     checkpoint.write_text("state")
-    run("make-references", *command)
-    assert "--resume" not in picture.read_text()
+    interrupt(signal.SIGTERM, [ROOT / "scripts/make-references", *command], picture)
+    assert "--resume" not in picture.read_text() and not checkpoint.exists()
 
 
 def main():
