@@ -2,10 +2,12 @@
 // Checks shared by the readers of all cache files: FlatBuffers and structs that are read in place, and the validity of
 // mixtures. A failed check throws std::runtime_error with the message "NAME: damaged: what is wrong".
 
+#include <cstdint>
 #include <initializer_list>
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include <flatbuffers/flatbuffers.h>
 
@@ -37,10 +39,14 @@ const Root& verifiedBuffer(std::span<const std::byte> payload, const std::string
   return *flatbuffers::GetRoot<Root>(data);
 }
 
-/// A view of a FlatBuffers vector of structs, without copying.
-template <class To, class From>
-std::span<const To> inPlace(const flatbuffers::Vector<const From*>& vector) {
+/// A view of a FlatBuffers vector of structs or numbers, without copying. Throws unless it is aligned, which the
+/// verifier of FlatBuffers checks for its size only.
+template <class To, class Element>
+std::span<const To> inPlace(const flatbuffers::Vector<Element>& vector, const std::string& name) {
+  using From = std::remove_pointer_t<Element>;
   static_assert(sizeof(To) == sizeof(From) && alignof(To) == alignof(From));
+  if (reinterpret_cast<std::uintptr_t>(vector.Data()) % alignof(To) != 0)
+    refuseDamaged(name, "a vector is not aligned");
   return {reinterpret_cast<const To*>(vector.Data()), vector.size()};
 }
 

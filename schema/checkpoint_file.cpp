@@ -41,7 +41,7 @@ void checkChoices(const CheckpointInfo& info, const std::string& name) {
     refuseDamaged(name, "number of light paths out of range");
 }
 
-CheckpointInfo readInfo(const fb::Checkpoint& file) {
+CheckpointInfo readInfo(const fb::Checkpoint& file, const std::string& name) {
   CheckpointInfo info;
   for (const fb::Setting* setting : *file.settings())
     info.settings.emplace_back(setting->name()->str(), setting->value()->str());
@@ -49,11 +49,12 @@ CheckpointInfo readInfo(const fb::Checkpoint& file) {
   info.height = file.height();
   info.trainingSeconds = file.seconds_training();
   info.renderingSeconds = file.seconds_rendering();
-  const std::span<const StoredPass> passes = inPlace<StoredPass>(*file.passes());
+  const std::span<const StoredPass> passes = inPlace<StoredPass>(*file.passes(), name);
   info.passes.assign(passes.begin(), passes.end());
   info.undersampledFraction = file.undersampled_fraction();
   info.learntFractions = file.learnt_fractions();
-  info.counters.assign(file.counters()->begin(), file.counters()->end());
+  const std::span<const std::uint64_t> counters = inPlace<std::uint64_t>(*file.counters(), name);
+  info.counters.assign(counters.begin(), counters.end());
   if (file.pilot()) info.pilot = std::bit_cast<StoredPilot>(*file.pilot());
   if (file.light_path_trial()) info.lightPathTrial = std::bit_cast<StoredLightPathTrial>(*file.light_path_trial());
   return info;
@@ -65,8 +66,8 @@ CheckpointFile::CheckpointFile(FileContent file, const std::filesystem::path& pa
   const std::string name = path.string();
   const std::span<const std::byte> payload = unwrapPayload(kCheckpointFormat, file_.bytes(), name);
   const auto& root = verifiedBuffer<fb::Checkpoint>(payload, name, "checkpoint");
-  info_ = readInfo(root);
-  pixels_ = inPlace<StoredPixel>(*root.pixels());
+  info_ = readInfo(root, name);
+  pixels_ = inPlace<StoredPixel>(*root.pixels(), name);
   illumination_ = std::as_bytes(std::span(root.illumination()->data(), root.illumination()->size()));
   importance_ = std::as_bytes(std::span(root.importance()->data(), root.importance()->size()));
   if (pixels_.empty() || std::uint64_t{info_.width} * info_.height != pixels_.size())

@@ -69,8 +69,8 @@ IlluminationFile::IlluminationFile(FileContent file, const std::filesystem::path
   header_ = containerHeader(file_.bytes());
   const auto& root = verifiedBuffer<fb::Illumination>(payload, name, "trained illumination file");
   info_ = readInfo(root);
-  records_ = inPlace<StoredIllumination>(*root.records());
-  components_ = inPlace<CacheComponent>(*root.components());
+  records_ = inPlace<StoredIllumination>(*root.records(), name);
+  components_ = inPlace<CacheComponent>(*root.components(), name);
   // The look-up divides by the unit, whose inverse would overflow if it were subnormal.
   if (!(info_.unit > 0 && std::isnormal(info_.unit))) refuseDamaged(name, "the unit of length is out of range");
   if (!(info_.undersampledFraction >= 0 && info_.undersampledFraction <= 1))

@@ -58,8 +58,8 @@ LobeCache::LobeCache(FileContent file, const std::filesystem::path& path) : file
   header_ = containerHeader(file_.bytes());
   const auto& cache = verifiedBuffer<fb::LobeCache>(payload, name, "lobe cache");
   info_ = readInfo(cache, name);
-  records_ = inPlace<CacheRecord>(*cache.records());
-  components_ = inPlace<CacheComponent>(*cache.components());
+  records_ = inPlace<CacheRecord>(*cache.records(), name);
+  components_ = inPlace<CacheComponent>(*cache.components(), name);
   if (info_.gridKind > kLastGridKind) refuseDamaged(name, fmt::format("grid of unknown kind {}", info_.gridKind));
   lookup_ = {cache.lookup()->data(), cache.lookup()->size()};
   if (info_.gridCount < 1 || info_.gridCount != lookup_.size())

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -14,6 +15,7 @@
 
 #include "lobe_generated.h"
 #include "runtime/core/atomic_file.h"
+#include "schema/cache_checks.h"
 #include "schema/lobe_cache.h"
 #include "tests/support/schema_test_tools.h"
 
@@ -140,6 +142,16 @@ TEST_CASE("schema: damaged caches with a valid hash neither crash nor throw othe
     reseal(bad);
     CHECK(contains(opener.fault(bad), "damaged"));
   }
+}
+
+TEST_CASE("schema: vectors that are not aligned are rejected") {
+  // The size of the vector, 1, before an element of 8 bytes.
+  alignas(8) std::array<std::uint32_t, 4> words{1, 1, 7, 0};
+  const auto read = [&](std::size_t word) {
+    return inPlace<std::uint64_t>(reinterpret_cast<const flatbuffers::Vector<std::uint64_t>&>(words[word]), "a.ckpt");
+  };
+  CHECK(read(1)[0] == 7);
+  CHECK_THROWS_WITH(read(0), "a.ckpt: damaged: a vector is not aligned");
 }
 
 TEST_CASE("schema: errors name the kind of fault") {
