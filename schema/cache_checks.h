@@ -39,12 +39,13 @@ const Root& verifiedBuffer(std::span<const std::byte> payload, const std::string
   return *flatbuffers::GetRoot<Root>(data);
 }
 
-/// A view of a FlatBuffers vector of structs or numbers, without copying. Throws unless it is aligned, which the
-/// verifier of FlatBuffers checks for its size only.
+/// A view of a FlatBuffers vector of structs or numbers, without copying. Throws unless it is empty or aligned, which
+/// the verifier of FlatBuffers checks for its size only.
 template <class To, class Element>
 std::span<const To> inPlace(const flatbuffers::Vector<Element>& vector, const std::string& name) {
   using From = std::remove_pointer_t<Element>;
   static_assert(sizeof(To) == sizeof(From) && alignof(To) == alignof(From));
+  if (vector.size() == 0) return {};
   if (reinterpret_cast<std::uintptr_t>(vector.Data()) % alignof(To) != 0)
     refuseDamaged(name, "a vector is not aligned");
   return {reinterpret_cast<const To*>(vector.Data()), vector.size()};

@@ -145,12 +145,13 @@ TEST_CASE("schema: damaged caches with a valid hash neither crash nor throw othe
 }
 
 TEST_CASE("schema: vectors that are not aligned are rejected") {
-  // The size of the vector, 1, before an element of 8 bytes.
-  alignas(8) std::array<std::uint32_t, 4> words{1, 1, 7, 0};
+  // The size of the vector, 1, before an element of 8 bytes; and of an empty one.
+  alignas(8) std::array<std::uint32_t, 5> words{1, 1, 7, 0, 0};
   const auto read = [&](std::size_t word) {
     return inPlace<std::uint64_t>(reinterpret_cast<const flatbuffers::Vector<std::uint64_t>&>(words[word]), "a.ckpt");
   };
   CHECK(read(1)[0] == 7);
+  CHECK(read(4).empty());
   CHECK_THROWS_WITH(read(0), "a.ckpt: damaged: a vector is not aligned");
 }
 
