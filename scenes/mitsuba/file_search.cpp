@@ -48,8 +48,8 @@ const FileSearch::Result& FileSearch::find(const std::string& name) {
 
 FileSearch::Result FileSearch::search(const std::string& name) {
   std::vector<std::filesystem::path> folders;
-  // NOLINTNEXTLINE(modernize-loop-convert): clang 14 has no std::views::reverse.
-  for (auto folder = folders_.rbegin(); folder != folders_.rend(); ++folder) folders.push_back(folder->path);
+  std::transform(folders_.rbegin(), folders_.rend(), std::back_inserter(folders),
+                 [](const Folder& folder) { return folder.path; });
   folders.push_back(own_);
   for (const std::filesystem::path& folder : folders) {
     throwIfCancelled();
