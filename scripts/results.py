@@ -112,7 +112,7 @@ def print_methods(rows, methods, label, text):
 
 def print_errors(summary):
     """All budgets, and in brackets the variance of all pixels."""
-    print_methods(rows_of(summary), methods_of(summary), lambda scene, budget: f"{scene}, {budget}",
+    print_methods(rows_of(summary), methods_of(summary), lambda scene, budget: f"{scene}, {budget_text(budget)}",
                   lambda one: f"{variance(one)} ({digits(one['all'])})")
 
 

@@ -13,6 +13,7 @@ import os
 import pathlib
 import pty
 import runpy
+import shutil
 import signal
 import struct
 import subprocess
@@ -309,7 +310,7 @@ def check_import(folder):
     wrong("seconds must be positive")
     times.write_text(f"scene,seed,seconds\n{SCENE},1,3\n{SCENE},2,5\n")
     shown = run("evaluate", *command(folder, "--import", "peer", peer))
-    assert shown.splitlines()[2] == (f"| {SCENE}, seconds 8 | 0.02 ± 0.002 (0.02) | **0.01 ± 0.001 (0.01)** | **0.0118 ± 0.001 (0.0118)** "
+    assert shown.splitlines()[2] == (f"| {SCENE}, 8 s | 0.02 ± 0.002 (0.02) | **0.01 ± 0.001 (0.01)** | **0.0118 ± 0.001 (0.0118)** "
                                      "| 0.01 ± 0.001 (0.01) |"), shown
     plan = json.loads((folder / "out/plan.json").read_text())
     assert plan["imports"]["peer"][f"{SCENE}-2.exr"] == sha256(peer / f"{SCENE}-2.exr"), plan
@@ -332,12 +333,36 @@ def check_import_only(folder):
 def check_markdown(folder):
     machine = json.loads((folder / "out/plan.json").read_text())["machine"]
     parts = run("report", folder / "out", "--markdown").split("\n\n")
-    assert parts[0].startswith(f"{machine['cpu']}, {machine['cores']} cores;"), parts[0]
+    assert parts[0].startswith(f"{machine['cpu']}, {machine['cores']} core"), parts[0]
     assert parts[1].splitlines() == [f"|  | a:path | a:product-naive | a:{LONG} | peer |", "|---|---|---|---|---|",
                                      f"| {SCENE}, 8 s | 0.02 ± 0.002 | **0.01 ± 0.001** | **0.0118 ± 0.001** | 0.01 ± 0.001 |"], parts[1]
     assert parts[2] == (f"Lowest, of 1 scene: `a:product-naive` alone in 0, among the lowest in 1; `a:{LONG}` alone in 0, among the lowest "
                         "in 1."), parts[2]
     assert parts[4].splitlines()[-1].endswith(" | 0.757 |"), parts[4]
+
+
+def check_update(folder):
+    """Tables of a Markdown file are made again from saved evaluations, and what stands around them stays."""
+    text = folder / "text.md"
+    run("report", folder / "out", "--save", folder / "saved.json")
+    text.write_text("Before.\n\n<!-- evaluation: saved.json -->\nold\n<!-- end of evaluation -->\n\nAfter.\n")
+    run("report", "--update", text)
+    updated = text.read_text()
+    assert updated.startswith("Before.\n\n<!-- evaluation: saved.json -->\n\n|  | a:path |"), updated
+    assert updated.endswith("\n\n<!-- end of evaluation -->\n\nAfter.\n") and "old" not in updated, updated
+    assert f"\n    scripts/evaluate OUT --scenes {SCENE} " in updated, updated
+    assert "" == run("report", "--update", text) and text.read_text() == updated, text.read_text()
+    text.write_text("<!-- evaluation: missing.json -->\n<!-- end of evaluation -->\n")
+    assert "missing.json: not found" in run("report", "--update", text, code=1)
+    assert "give either OUT or --update FILE.md" in run("report", code=2)
+
+
+def check_results(folder):
+    """The tables of docs/results.md are those of docs/data."""
+    shutil.copytree(ROOT / "docs/data", folder / "data")
+    copied = pathlib.Path(shutil.copy(ROOT / "docs/results.md", folder))
+    run("report", "--update", copied)
+    assert copied.read_text() == (ROOT / "docs/results.md").read_text(), "run scripts/report --update docs/results.md"
 
 
 def check_comparison(folder):
@@ -519,8 +544,8 @@ def main():
         folder = pathlib.Path(name)
         make_tools(folder / "tools")
         for check in (check_plan, check_refused, check_continued, check_interrupted, check_repeated, check_progress, check_pairs,
-                      check_plan_last, check_black, check_usage, check_import, check_import_only, check_markdown, check_comparison,
-                      check_comparison_usage, check_charts, check_long_run, check_missing_errors, check_reference, check_made_references,
+                      check_plan_last, check_black, check_usage, check_import, check_import_only, check_markdown, check_update,
+                      check_results, check_comparison, check_comparison_usage, check_charts, check_long_run, check_missing_errors, check_reference, check_made_references,
                       check_resumed_references):
             check(folder)
             print(check.__name__, "passed", flush=True)
