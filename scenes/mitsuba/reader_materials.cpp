@@ -12,8 +12,6 @@
 namespace lobe {
 namespace {
 
-constexpr int kMostParts = 1000;
-
 /// children: fingerprints of the nested BSDFs. The data in the file of a measured BSDF is covered by the keys of its
 /// lobes.
 std::uint64_t fingerprintOf(const std::string& type, const Parameters& parameters,

@@ -189,8 +189,9 @@ void checkFrame(const Camera& camera) {
   const Eigen::Matrix3d frame = camera.toWorld.topLeftCorner<3, 3>().cast<double>();
   if (!(frame.array().abs() <= kLargestCoordinate).all())
     throw ParameterError("to_world", fmt::format("a camera's scale must not be over {:g}", kLargestCoordinate));
-  if (frame.determinant() == 0 || frame.cwiseAbs().maxCoeff() < kSmallestLength)
-    throw ParameterError("to_world", "a camera's transform must not be singular");
+  if (frame.determinant() == 0) throw ParameterError("to_world", "a camera's transform must not be singular");
+  if (frame.cwiseAbs().maxCoeff() < kSmallestLength)
+    throw ParameterError("to_world", fmt::format("a camera's scale must not be under {:g}", kSmallestLength));
 }
 
 /// A length along an axis of the camera's frame, in the world.

@@ -78,8 +78,6 @@ TexturePtr makeScaled(const Parameters& parameters) {
   return scaledTexture(parameters.onlyTexture(), parameters.colour("scale", grey(1.0f)));
 }
 
-constexpr int kMostParts = 1000;
-
 }  // namespace
 
 TexturePtr TextureReader::read(pugi::xml_node node, Encoded encoded) {

@@ -12,6 +12,10 @@ namespace lobe {
 /// colours (asGiven) or as values of either sign (asGivenSigned), or as linear values of either sign (linear).
 enum class Encoded { asGiven, asGivenSigned, linear };
 
+/// A limit of the textures nested in an element, and of its BSDFs and textures together, counted as often as they are
+/// evaluated.
+inline constexpr int kMostParts = 1000;
+
 class TextureReader {
  public:
   explicit TextureReader(ReadContext& context) : context_(context), images_(context) {}

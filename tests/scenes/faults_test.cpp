@@ -207,6 +207,7 @@ TEST_CASE("scenes: cameras and filters beyond the range of rays are rejected") {
   for (const std::string type : {"perspective", "orthographic"}) {
     checkFault(fault(type, scale("value=\"1e30\"")), "2:1", {"a camera's scale", "1e+15"});
     checkFault(fault(type, scale("value=\"0\"")), "2:1", {"singular"});
+    checkFault(fault(type, scale("value=\"1e-36\"")), "2:1", {"a camera's scale", "1e-35"});
     checkFault(fault(type, scale("x=\"0\"")), "2:1", {"singular"});
     CHECK(fault(type, scale("value=\"1e-30\"")) == "");
   }
