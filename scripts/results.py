@@ -22,6 +22,13 @@ def sha256(path):
     return hashlib.sha256(pathlib.Path(path).read_bytes()).hexdigest()
 
 
+def write(path, text):
+    """Replaces the file at once, so that an interruption leaves the old or the new content."""
+    temporary = path.with_name(path.name + ".tmp")
+    temporary.write_text(text)
+    temporary.replace(path)
+
+
 def is_biased(options):
     """Whether pictures by these options of loberender differ from the expected picture by more than noise."""
     text = " ".join(options).replace("=", " ")

@@ -352,6 +352,11 @@ def check_update(folder):
     assert updated.endswith("\n\n<!-- end of evaluation -->\n\nAfter.\n") and "old" not in updated, updated
     assert f"\n    scripts/evaluate OUT --scenes {SCENE} " in updated, updated
     assert "" == run("report", "--update", text) and text.read_text() == updated, text.read_text()
+    for wrong in ("", "<!-- evaluation: saved.json -->\n<!-- end of evaluations -->\n" + updated, updated.replace("evaluation:", "evaluate:")):
+        text.write_text(wrong)
+        assert "text.md: must have lines" in run("report", "--update", text, code=1) and text.read_text() == wrong, wrong
+    text.write_text("<!-- evaluation: saved.json saved.json -->\n<!-- end of evaluation -->\n")
+    assert f"saved.json: {SCENE}, " in run("report", "--update", text, code=1)
     text.write_text("<!-- evaluation: missing.json -->\n<!-- end of evaluation -->\n")
     assert "missing.json: not found" in run("report", "--update", text, code=1)
     assert "give either OUT or --update FILE.md" in run("report", code=2)
