@@ -84,10 +84,16 @@ class Temporary {
     if (!replaced_) ::unlink(temporary_.c_str());
   }
 
-  /// Gives the file the permissions of the file that it replaces, if there is one.
+  /// Gives the file the permissions of the file that it replaces, if there is one. Some file systems refuse this, such
+  /// as FAT drives and network folders that are mounted by another user; then the content is more important, unless the
+  /// file would grant more than the one that it replaces.
   void keepPermissions() const {
-    struct stat status;
-    if (::stat(target_.c_str(), &status) == 0 && ::fchmod(file_, status.st_mode & 07777) != 0) refuse(path_, errno);
+    struct stat replaced, own;
+    if (::stat(target_.c_str(), &replaced) != 0) return;
+    if (::fstat(file_, &own) != 0) refuse(path_, errno);
+    if (replaced.st_mode == own.st_mode || ::fchmod(file_, replaced.st_mode & 07777) == 0) return;
+    const int error = errno;
+    if ((own.st_mode & ~replaced.st_mode & 0777) != 0) refuse(path_, error);
   }
 
   void write(std::span<const std::byte> bytes) {

@@ -9,7 +9,8 @@ namespace lobe {
 
 /// Writes bytes or text to a temporary file in the folder of `path`, and renames it to `path`. If that fails, the
 /// temporary file is removed, a file at `path` keeps its content, and std::runtime_error that names `path` is thrown.
-/// The folder must exist.
+/// The folder must exist. A file that is replaced keeps its permissions where the file system permits that; otherwise
+/// it is only replaced if the new one grants no more.
 void writeAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void writeAtomically(const std::filesystem::path& path, const std::string& text);
 

@@ -14,6 +14,7 @@
 #include <catch2/catch.hpp>
 
 #include "fitter/compile.h"
+#include "runtime/core/atomic_file.h"
 #include "runtime/core/parallel.h"
 #include "runtime/core/stop.h"
 #include "runtime/image/aov.h"
@@ -236,4 +237,26 @@ TEST_CASE("faults: failing writes of a compilation") {
   const SceneFolder folder(false);
   // Opening, twice because it is tried before the fit, writing, synchronising, closing and renaming.
   CHECK(injectIntoCompile(writes, folder) == 6);
+}
+
+TEST_CASE("faults: a file whose permissions cannot be kept is replaced unless the new one would grant more") {
+  const Folder folder;
+  const fs::path path = folder.write("a", "before");
+  const auto write = [&](const std::string& text, fs::perms permissions) {
+    fs::permissions(path, permissions);
+    constexpr long kChangeOfPermissions = 2;  // after opening the temporary file
+    const Injection injection(writes, kChangeOfPermissions);
+    writeAtomically(path, text);
+  };
+  CHECK_THROWS_WITH(write("refused", fs::perms::owner_read), path.string() + ": cannot write: Operation not permitted");
+  CHECK(test::readFile(path) == "before");
+  write("replaced", fs::perms::all);
+  CHECK(test::readFile(path) == "replaced");
+  CHECK(folder.files() == 1);
+  {
+    const Injection counted(writes, 0);
+    writeAtomically(path, std::string("again"));  // has the permissions of a new file already
+  }
+  CHECK(writes.calls.load() == 5);  // opening, writing, synchronising, closing and renaming
+  CHECK(test::readFile(path) == "again");
 }
