@@ -121,9 +121,9 @@ class Run {
   double fractionDone() const;
   bool snapshotIsDue() const;
   void snapshot();
-  void writeOutputs(OutputErrors& errors) const;
+  void writeOutputs(OutputErrors& errors);
   void writePicture(const std::filesystem::path& output, const RunResult& result) const;
-  void writeCheckpoint(OutputErrors& errors) const;
+  void writeCheckpoint(OutputErrors& errors);
   std::string stopMessage() const;
   double prepared() const { return guiding_.seconds(); }
   const Film& film() const { return gradients_ ? gradients_->pixels() : *film_; }
@@ -150,6 +150,7 @@ class Run {
   RenderResult result_;
   std::uint64_t sceneHash_ = 0;  // for statistics and the metadata of the picture
   OutputErrors errors_;
+  bool checkpointIsWritten_ = false;  // by the last attempt
   Stopwatch sinceSnapshot_;
 };
 
@@ -329,7 +330,7 @@ Image Run::imageOf(Aov aov) const {
   return aov == Aov::variance ? film().varianceOfMean() : film().counts();
 }
 
-void Run::writeOutputs(OutputErrors& errors) const {
+void Run::writeOutputs(OutputErrors& errors) {
   const RunResult result{result_, guiding_, film()};
   for (const auto& output : job_.outputs) errors.attempt(output, [&] { writePicture(output, result); });
   writeCheckpoint(errors);
@@ -350,9 +351,9 @@ void Run::writePicture(const std::filesystem::path& output, const RunResult& res
   noteClamped(kTool, output, writeImage(output, written.image, all, layersOf(aovs), job_.exr));
 }
 
-void Run::writeCheckpoint(OutputErrors& errors) const {
+void Run::writeCheckpoint(OutputErrors& errors) {
   if (job_.checkpoint.empty()) return;
-  errors.attempt(job_.checkpoint, [&] {
+  checkpointIsWritten_ = errors.attempt(job_.checkpoint, [&] {
     const std::vector<std::byte> bytes =
         encodeCheckpoint(settings_, film(), result_, guiding_, illumination_, importance_);
     writeAtomically(job_.checkpoint, std::span<const std::byte>(bytes));
@@ -363,8 +364,12 @@ std::string Run::stopMessage() const {
   const auto [least, most] = film().sampleRange();
   std::string message = least == most ? fmt::format("{}", least) : fmt::format("{} to {}", least, most);
   if (job_.samples) message += fmt::format(" of {}", *job_.samples);
-  message += most > 0 ? " samples per pixel are rendered and written" : " samples per pixel, so no picture is written";
-  if (!job_.checkpoint.empty()) message += fmt::format("; --resume {} goes on", shellQuoted(job_.checkpoint.string()));
+  message += " samples per pixel";
+  if (most == 0)
+    message += ", so no picture is written";
+  else
+    message += errors_.all().empty() ? " are rendered and written" : " are rendered, but not all outputs are written";
+  if (checkpointIsWritten_) message += fmt::format("; --resume {} goes on", shellQuoted(job_.checkpoint.string()));
   return message;
 }
 

@@ -249,9 +249,10 @@ void checkOutputs(const std::vector<std::filesystem::path>& outputs, const std::
   }
 }
 
-void OutputErrors::attempt(const std::filesystem::path& path, const std::function<void()>& write) {
+bool OutputErrors::attempt(const std::filesystem::path& path, const std::function<void()>& write) {
   try {
     write();
+    return true;
   } catch (const OutOfMemory& e) {
     add(e.what());
   } catch (const std::bad_alloc&) {
@@ -259,6 +260,7 @@ void OutputErrors::attempt(const std::filesystem::path& path, const std::functio
   } catch (const std::exception& e) {
     add(e.what());
   }
+  return false;
 }
 
 void OutputErrors::add(const std::string& message) {

@@ -68,8 +68,8 @@ void checkOutputs(const std::vector<std::filesystem::path>& outputs, const std::
 class OutputErrors {
  public:
   /// Calls `write`; if it throws, its message is added to the errors, unless it is that of the error before, as if a
-  /// folder for several files cannot be created.
-  void attempt(const std::filesystem::path& path, const std::function<void()>& write);
+  /// folder for several files cannot be created. Returns whether it succeeded.
+  bool attempt(const std::filesystem::path& path, const std::function<void()>& write);
   const std::vector<std::string>& all() const { return errors_; }
   /// Throws std::runtime_error with one line for each error, if there are any.
   void throwIfAny() const;

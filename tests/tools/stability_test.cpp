@@ -289,6 +289,26 @@ TEST_CASE("loberender: an interrupted render writes the picture so far") {
   }
 }
 
+TEST_CASE("loberender: the message of an interrupted render says what could not be written") {
+  for (const auto& [outputs, end] :
+       {std::pair("-o sub/b.png --checkpoint run.ckpt", "not all outputs are written; --resume run.ckpt goes on\n"),
+        std::pair("-o b.png --checkpoint sub/run.ckpt", "not all outputs are written\n")}) {
+    const SceneFolder folder(false);
+    fs::create_directory(folder / "sub");
+    Background render(folder, kLong + " --snapshot-every 0.1 --stats s.json " + outputs);
+    waitFor([&] { return folder.has("s.json"); });  // a snapshot
+    fs::rename(folder / "sub", folder / "away");
+    render.send(SIGTERM);
+    CHECK(render.wait() == 1);
+    const std::string errors = folder.bytes("error");
+    CAPTURE(outputs, errors);
+    CHECK_THAT(errors, Contains("interrupted: ") &&
+                           Contains(std::string(" of 1000000000 samples per pixel are rendered, but ") + end) &&
+                           Contains("cannot write: No such file or directory"));
+    CHECK(readImage(folder / "a.exr").width == 16);
+  }
+}
+
 TEST_CASE("loberender: an interruption before rendering writes nothing") {
   const SceneFolder folder(true);
   folder.write("noted.xml", sceneWithNote());
