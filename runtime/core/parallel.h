@@ -2,7 +2,10 @@
 // Parallel loops and sorting that either complete or throw.
 
 #include <algorithm>
+#include <cstddef>
+#include <exception>
 #include <stdexcept>
+#include <vector>
 
 #if defined(__SANITIZE_THREAD__)
 #include <sanitizer/tsan_interface.h>
@@ -96,6 +99,24 @@ void parallelForEach(Index begin, Index end, const Body& body) {
   };
   tbb::parallel_for(tbb::blocked_range<Index>(begin, end, 1), run, tbb::simple_partitioner(), context);
   if (context.is_group_execution_cancelled()) throw LoopCancelled();
+}
+
+/// Calls body(i) for every i < count in parallel. Unlike with parallelFor, the exception of an iteration does not
+/// cancel the others. Returns the exception of each iteration; null if there is none. Throws LoopCancelled if the loop
+/// or an iteration is cancelled from outside, because that is no failure of the iteration.
+template <class Body>
+std::vector<std::exception_ptr> parallelAttempts(std::size_t count, const Body& body) {
+  std::vector<std::exception_ptr> failures(count);
+  parallelFor(std::size_t{0}, count, [&](std::size_t i) {
+    try {
+      body(i);
+    } catch (const LoopCancelled&) {
+      throw;
+    } catch (...) {
+      failures[i] = std::current_exception();
+    }
+  });
+  return failures;
 }
 
 /// Calls the functions in parallel. Throws like parallelFor.

@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include <fmt/format.h>
@@ -140,24 +139,22 @@ void printStale(const std::vector<CompileJob>& jobs) {
           fmt::format("lobefit: {} is fitted again: {}\n", job.path.string(), withoutPath(job.stale, job.path)));
 }
 
-/// A cache, or why there is none.
-using Outcome = std::variant<CacheReport, std::exception_ptr>;
+/// The caches of all jobs.
+struct Outcomes {
+  std::vector<CacheReport> reports;
+  std::vector<std::exception_ptr> failures;  ///< why there is no cache; null if there is one
+};
 
-std::vector<Outcome> compileAll(const std::vector<CompileJob>& jobs, const StopFlag& stop) {
+Outcomes compileAll(const std::vector<CompileJob>& jobs, const StopFlag& stop) {
   Progress progress("fitting", workOfAll(jobs));
-  std::vector<Outcome> outcomes(jobs.size());
-  // Lobes are fitted in parallel as well, because the first few directions of each lobe leave cores idle. An exception
-  // would cancel the other lobes, so that of each is stored.
+  Outcomes outcomes{std::vector<CacheReport>(jobs.size()), {}};
+  // Lobes are fitted in parallel as well, because the first few directions of each lobe leave cores idle.
   std::atomic<std::size_t> complete = static_cast<std::size_t>(std::ranges::count_if(jobs, &CompileJob::upToDate));
   try {
     stoppable(stop, "", [&] {
-      parallelFor(std::size_t{0}, jobs.size(), [&](std::size_t i) {
-        try {
-          outcomes[i] = compileOne(jobs[i], progress);
-          if (!jobs[i].upToDate) ++complete;
-        } catch (...) {
-          outcomes[i] = std::current_exception();
-        }
+      outcomes.failures = parallelAttempts(jobs.size(), [&](std::size_t i) {
+        outcomes.reports[i] = compileOne(jobs[i], progress);
+        if (!jobs[i].upToDate) ++complete;
       });
     });
   } catch (const Stopped&) {
@@ -168,14 +165,14 @@ std::vector<Outcome> compileAll(const std::vector<CompileJob>& jobs, const StopF
 }
 
 /// The caches that are complete. The errors of the others are added to the errors.
-std::vector<CacheReport> completeOnes(const std::vector<CompileJob>& jobs, const std::vector<Outcome>& outcomes,
+std::vector<CacheReport> completeOnes(const std::vector<CompileJob>& jobs, const Outcomes& outcomes,
                                       OutputErrors& errors) {
   std::vector<CacheReport> reports;
   for (std::size_t i = 0; i < jobs.size(); ++i) {
-    if (const auto* failure = std::get_if<std::exception_ptr>(&outcomes[i]))
-      errors.attempt(jobs[i].path, [&] { std::rethrow_exception(*failure); });
+    if (outcomes.failures[i])
+      errors.attempt(jobs[i].path, [&] { std::rethrow_exception(outcomes.failures[i]); });
     else
-      reports.push_back(std::get<CacheReport>(outcomes[i]));
+      reports.push_back(outcomes.reports[i]);
   }
   return reports;
 }

@@ -1,8 +1,11 @@
 // Parallel loops that fail or are stopped never look complete.
 
 #include <atomic>
+#include <cstddef>
+#include <exception>
 #include <stdexcept>
 #include <thread>
+#include <vector>
 
 #include <catch2/catch.hpp>
 
@@ -64,6 +67,27 @@ TEST_CASE("core: stopped work does not look complete, whichever loop it is in") 
       }
     }
   });
+}
+
+TEST_CASE("core: failures of attempts are returned and do not cancel the others") {
+  std::atomic<int> calls = 0;
+  const std::vector<std::exception_ptr> failures = parallelAttempts(kCount, [&](std::size_t i) {
+    ++calls;
+    if (i % 2 == 1) throw std::runtime_error("injected");
+  });
+  CHECK(calls == kCount);
+  REQUIRE(failures.size() == kCount);
+  for (std::size_t i = 0; i < failures.size(); ++i) CHECK((failures[i] != nullptr) == (i % 2 == 1));
+  CHECK_THROWS_WITH(std::rethrow_exception(failures[1]), "injected");
+}
+
+TEST_CASE("core: an attempt that is cancelled from outside is no failure of its own") {
+  // Cancelling from outside reaches the loops inside an attempt and the one over the attempts in any order.
+  CHECK_THROWS_AS(parallelAttempts(kCount,
+                                   [](std::size_t i) {
+                                     if (i == kCount - 1) throw LoopCancelled();
+                                   }),
+                  LoopCancelled);
 }
 
 TEST_CASE("core: work that is not stopped completes, and its errors pass") {
