@@ -13,6 +13,7 @@
 #include "fitter/cache_mixture.h"
 #include "fitter/lobe_fit.h"
 #include "runtime/core/atomic_file.h"
+#include "runtime/core/files.h"
 #include "runtime/core/parallel.h"
 #include "runtime/mixture/lookup.h"
 
@@ -237,7 +238,9 @@ void runCompile(const CompileJob& job, const std::function<void()>& advance) {
   const FittedGrid fit = fitGrid(*job.use.lobe, job.grid, job.info.settings, advance);
   LobeCacheInfo info = job.info;
   info.quarter = fit.quarter;
-  writeAtomically(job.path, encodeLobeCache(info, fit.records, fit.components, fit.lookup));
+  const std::vector<std::byte> bytes =
+      nameErrors(job.path, [&] { return encodeLobeCache(info, fit.records, fit.components, fit.lookup); });
+  writeAtomically(job.path, std::span<const std::byte>(bytes));
 }
 
 }  // namespace lobe

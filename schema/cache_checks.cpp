@@ -55,4 +55,11 @@ void checkBufferPlace(std::span<const std::byte> payload, const std::string& nam
   if (reinterpret_cast<std::uintptr_t>(payload.data()) % 8 != 0) refuseDamaged(name, "not aligned to 8 bytes");
 }
 
+std::size_t bufferSize(std::size_t vectors, std::string_view what) {
+  constexpr std::size_t kOthers = 1 << 20;  // more than the other fields take
+  if (vectors >= FLATBUFFERS_MAX_BUFFER_SIZE - kOthers)
+    throw std::runtime_error(fmt::format("{} are too large: a file holds less than 2 GiB", what));
+  return vectors + kOthers;
+}
+
 }  // namespace lobe

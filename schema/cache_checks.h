@@ -1,7 +1,9 @@
 #pragma once
-// Checks shared by the readers of all cache files: FlatBuffers and structs that are read in place, and the validity of
-// mixtures. A failed check throws std::runtime_error with the message "NAME: damaged: what is wrong".
+// Checks shared by the readers and writers of all cache files: FlatBuffers and structs that are read in place, and the
+// validity of mixtures. A failed check of a reader throws std::runtime_error with the message "NAME: damaged: what is
+// wrong".
 
+#include <cstddef>
 #include <cstdint>
 #include <initializer_list>
 #include <span>
@@ -28,6 +30,10 @@ bool weightsSumToOne(std::span<const CacheComponent> mixture);
 
 /// Throws unless the size and alignment of the payload are valid for a FlatBuffer.
 void checkBufferPlace(std::span<const std::byte> payload, const std::string& name);
+
+/// The size to reserve for a FlatBuffer with vectors of so many bytes together. Throws std::runtime_error if they are
+/// too many for a file. `what` names the vectors in the message.
+std::size_t bufferSize(std::size_t vectors, std::string_view what);
 
 /// Verifies the structure of a payload and returns its root table. `what` names the file type in messages.
 template <class Root>

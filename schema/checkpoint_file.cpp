@@ -3,7 +3,6 @@
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
 #include <fmt/format.h>
 
@@ -87,11 +86,8 @@ CheckpointFile CheckpointFile::open(const std::filesystem::path& path) {
 std::vector<std::byte> encodeCheckpoint(const CheckpointInfo& info, std::span<const StoredPixel> pixels,
                                         std::span<const std::byte> illumination,
                                         std::span<const std::byte> importance) {
-  constexpr std::size_t kOthers = 1 << 20;  // more than the other fields take
-  const std::size_t size = pixels.size_bytes() + illumination.size() + importance.size() + kOthers;
-  if (size > FLATBUFFERS_MAX_BUFFER_SIZE)
-    throw std::runtime_error("the film, the illumination and the importance are too large");
-  flatbuffers::FlatBufferBuilder builder(size);
+  const std::size_t vectors = pixels.size_bytes() + illumination.size() + importance.size();
+  flatbuffers::FlatBufferBuilder builder(bufferSize(vectors, "the film, the illumination and the importance"));
   std::vector<flatbuffers::Offset<fb::Setting>> settings;
   for (const auto& [name, value] : info.settings) {
     const auto nameText = builder.CreateString(name);

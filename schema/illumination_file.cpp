@@ -95,7 +95,8 @@ IlluminationFile IlluminationFile::parse(std::span<const std::byte> bytes, const
 
 std::vector<std::byte> encodeIllumination(const IlluminationInfo& info, std::span<const StoredIllumination> records,
                                           std::span<const CacheComponent> components) {
-  flatbuffers::FlatBufferBuilder builder(1024 + records.size_bytes() + components.size_bytes());
+  const std::size_t vectors = records.size_bytes() + components.size_bytes();
+  flatbuffers::FlatBufferBuilder builder(bufferSize(vectors, "the records of the illumination"));
   const StoredTrainingSettings& s = info.settings;
   const auto settings = fb::CreateTrainingSettings(builder, builder.CreateString(s.from), s.passes, s.photons,
                                                    s.importons, s.components, s.seed, s.learntFractions, s.maxDepth);

@@ -74,7 +74,7 @@ class IlluminationFile {
   ContainerHeader header_{};
 };
 
-/// The bytes of a file. Equal input gives equal bytes.
+/// The bytes of a file. Equal input gives equal bytes. Throws std::runtime_error if they are too many for the format.
 std::vector<std::byte> encodeIllumination(const IlluminationInfo& info, std::span<const StoredIllumination> records,
                                           std::span<const CacheComponent> components);
 

@@ -90,7 +90,8 @@ std::string lobeFileName(const std::string& model, const std::string& key) {
 std::vector<std::byte> encodeLobeCache(const LobeCacheInfo& info, std::span<const CacheRecord> records,
                                        std::span<const CacheComponent> components,
                                        std::span<const std::uint32_t> lookup) {
-  flatbuffers::FlatBufferBuilder builder(1024 + records.size_bytes() + components.size_bytes());
+  const std::size_t vectors = records.size_bytes() + components.size_bytes() + lookup.size_bytes();
+  flatbuffers::FlatBufferBuilder builder(bufferSize(vectors, "the records and the look-ups of the lobe"));
   const FitSettings& s = info.settings;
   const auto settings = fb::CreateFitSettings(builder, builder.CreateString(nameOf(s.method)), s.components, s.samples,
                                               s.reduction, s.revision, s.quality, s.fixedGrid);

@@ -92,7 +92,8 @@ inline constexpr std::uint32_t kMaxCacheComponents = 32;
 /// fitter always use the same name.
 std::string lobeFileName(const std::string& model, const std::string& key);
 
-/// The bytes of a cache file. Equal input gives equal bytes.
+/// The bytes of a cache file. Equal input gives equal bytes. Throws std::runtime_error if they are too many for the
+/// format.
 std::vector<std::byte> encodeLobeCache(const LobeCacheInfo& info, std::span<const CacheRecord> records,
                                        std::span<const CacheComponent> components,
                                        std::span<const std::uint32_t> lookup);

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "runtime/core/atomic_file.h"
+#include "runtime/core/files.h"
 #include "runtime/guiding/field_data.h"
 #include "runtime/guiding/illumination_store.h"
 #include "runtime/guiding/sample_storage_data.h"
@@ -65,7 +66,7 @@ Field Field::load(const std::filesystem::path& path) {
 void Field::save(const std::filesystem::path& path) const {
   IlluminationInfo info;
   info.toolVersion = LOBE_VERSION;
-  const std::vector<std::byte> bytes = storeIllumination(cache(), std::move(info));
+  const std::vector<std::byte> bytes = nameErrors(path, [&] { return storeIllumination(cache(), std::move(info)); });
   writeAtomically(path, std::span<const std::byte>(bytes));
 }
 

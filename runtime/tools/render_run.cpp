@@ -17,6 +17,7 @@
 
 #include "runtime/analysis/record_view.h"
 #include "runtime/core/atomic_file.h"
+#include "runtime/core/files.h"
 #include "runtime/core/stop.h"
 #include "runtime/core/stopwatch.h"
 #include "runtime/image/image_output.h"
@@ -116,6 +117,7 @@ class Run {
   void readStored(const IlluminationFile& file);
   void readIllumination(const IlluminationFile& file, const std::filesystem::path& path);
   void makeGuiding();
+  void encodeTraining(const TrainingPlan& plan);
   void saveTraining();
   RenderOptions options();
   double fractionDone() const;
@@ -142,6 +144,7 @@ class Run {
   Guiding guiding_;
   // For checkpoints and --save-illumination: the content of .illum files.
   std::vector<std::byte> illumination_, importance_;
+  OutputErrors encodingErrors_;  // why one of these is missing
   RunSettings settings_;
   AnyIntegrator integrator_;
   std::optional<Film> film_;
@@ -240,22 +243,28 @@ void Run::makeGuiding() {
   const TrainingPlan plan = planOf(job_, *scene_);
   if (!resumed_ && (job_.illumination.empty() || job_.trainsFurther()))
     train(job_, plan, *renderScene_, *camera_, guiding_);
+  encodingErrors_.attempt("the trained illumination", [&] { encodeTraining(plan); });
+  guiding_.reduceRecords(job_.reduction);
+  guiding_.sampler.emplace(*scene_, guiding_.training.field, guiding_.cachesOrNull());
+  guiding_.lightSampler.emplace(*scene_, guiding_.training.importance, nullptr);
+}
+
+void Run::encodeTraining(const TrainingPlan& plan) {
   if (!job_.checkpoint.empty() || !job_.saveIllumination.empty())
     illumination_ = encodeIllumination(guiding_.training, plan, *scene_, job_.scene);
   if (!job_.checkpoint.empty() && guiding_.training.importance.records() > 0)
     importance_ =
         encodeIllumination({guiding_.training.importance, guiding_.training.report, {}, {}, guiding_.training.maxDepth},
                            plan, *scene_, job_.scene);
-  guiding_.reduceRecords(job_.reduction);
-  guiding_.sampler.emplace(*scene_, guiding_.training.field, guiding_.cachesOrNull());
-  guiding_.lightSampler.emplace(*scene_, guiding_.training.importance, nullptr);
 }
 
 /// Writes what a later run would have to train again otherwise. Failures do not prevent rendering.
 void Run::saveTraining() {
   if (!job_.saveIllumination.empty())
-    errors_.attempt(job_.saveIllumination,
-                    [&] { writeAtomically(job_.saveIllumination, std::span<const std::byte>(illumination_)); });
+    errors_.attempt(job_.saveIllumination, [&] {
+      if (illumination_.empty()) nameErrors(job_.saveIllumination, [&] { encodingErrors_.throwIfAny(); });
+      writeAtomically(job_.saveIllumination, std::span<const std::byte>(illumination_));
+    });
   for (const std::string& error : errors_.all()) printWarning(kTool, error + "; rendering goes on");
   OutputErrors ofCheckpoint;  // it is written again later
   writeCheckpoint(ofCheckpoint);
@@ -354,8 +363,10 @@ void Run::writePicture(const std::filesystem::path& output, const RunResult& res
 void Run::writeCheckpoint(OutputErrors& errors) {
   if (job_.checkpoint.empty()) return;
   checkpointIsWritten_ = errors.attempt(job_.checkpoint, [&] {
-    const std::vector<std::byte> bytes =
-        encodeCheckpoint(settings_, film(), result_, guiding_, illumination_, importance_);
+    const std::vector<std::byte> bytes = nameErrors(job_.checkpoint, [&] {
+      encodingErrors_.throwIfAny();
+      return encodeCheckpoint(settings_, film(), result_, guiding_, illumination_, importance_);
+    });
     writeAtomically(job_.checkpoint, std::span<const std::byte>(bytes));
   });
 }

@@ -16,6 +16,8 @@
 #include "lobe_generated.h"
 #include "runtime/core/atomic_file.h"
 #include "schema/cache_checks.h"
+#include "schema/checkpoint_file.h"
+#include "schema/illumination_file.h"
 #include "schema/lobe_cache.h"
 #include "tests/support/schema_test_tools.h"
 
@@ -289,6 +291,28 @@ TEST_CASE("schema: writing to a dangling symbolic link creates its target") {
   CHECK(text == "new");
   fs::create_symlink("loop", folder.path / "loop");
   CHECK_THROWS_WITH(writeAtomically(folder.path / "loop", std::string("x")), Catch::Contains("loop: cannot write"));
+}
+
+TEST_CASE("schema: content that is too large for a file is refused before it is encoded") {
+  constexpr std::size_t kLimit = (std::size_t{1} << 31) - 1;  // checkBufferPlace refuses such payloads
+  CHECK(bufferSize(100, "they") > 100);
+  CHECK(bufferSize(kLimit - (1 << 21), "they") < kLimit);
+  for (const std::size_t size : {kLimit - 1, kLimit, 4 * kLimit})
+    CHECK_THROWS_WITH(bufferSize(size, "they"), "they are too large: a file holds less than 2 GiB");
+  // Views of more than there is; only their sizes are used.
+  const auto tooMany = []<class T>(const T& one) { return std::span(&one, kLimit / sizeof(T) + 1); };
+  const CacheRecord record{};
+  const CacheComponent component{};
+  const StoredIllumination illumination{};
+  const StoredPixel pixel{};
+  const std::uint32_t entry = 0;
+  const auto isTooLarge = Catch::Contains("too large");
+  CHECK_THROWS_WITH(encodeLobeCache({}, tooMany(record), {}, {}), isTooLarge);
+  CHECK_THROWS_WITH(encodeLobeCache({}, {}, tooMany(component), {}), isTooLarge);
+  CHECK_THROWS_WITH(encodeLobeCache({}, {}, {}, tooMany(entry)), isTooLarge);
+  CHECK_THROWS_WITH(encodeIllumination({}, tooMany(illumination), {}), isTooLarge);
+  CHECK_THROWS_WITH(encodeIllumination({}, {}, tooMany(component)), isTooLarge);
+  CHECK_THROWS_WITH(encodeCheckpoint({}, tooMany(pixel), {}, {}), isTooLarge);
 }
 
 TEST_CASE("schema: the file name depends only on model and key") {
