@@ -448,6 +448,8 @@ TEST_CASE("loberender: a checkpoint of another run is refused") {
              Contains("the hash of scene and camera was"));
   CHECK_THAT(refusal("loberender scene.xml -o a.exr --spp 2 --illumination a.illum"), Contains("another run"));
   CHECK_THAT(fault(folder, render + " --resume a.exr", 2), Contains("both an input and an output"));
+  CHECK_THAT(fault(folder, render + " --resume run.ckpt --reference a.exr --convergence e.csv", 2),
+             Contains("--convergence cannot be combined with --resume"));
   CHECK_THAT(fault(folder, render + " --resume a.illum", 1), Contains("a Lobe file of kind 'ILLU', expected 'CKPT'"));
   folder.write("run.ckpt", folder.bytes("run.ckpt").substr(0, 5000));
   CHECK_THAT(refusal(render), Contains("run.ckpt: truncated"));
