@@ -21,9 +21,10 @@ namespace {
 using Fault = std::array<char, 256>;
 
 /// OpenEXRCore only warns of these, and Imf::InputFile would allocate memory for a wrong size, or use another copy of
-/// the attribute. It checks the size of previews itself.
+/// the attribute. The size of a preview without pixels is right, although OpenEXRCore reports it.
 bool isHarmful(exr_result_t code, std::string_view message) {
-  return (code == EXR_ERR_ATTR_SIZE_MISMATCH && message.find("preview") == message.npos) ||
+  const bool isEmptyPreview = message.ends_with("Invalid size for preview 0 x 0");
+  return (code == EXR_ERR_ATTR_SIZE_MISMATCH && !isEmptyPreview) ||
          message.starts_with("Duplicate copy of required attribute");
 }
 

@@ -92,10 +92,11 @@ def tensor_file():
     return b"tensor_file\0" + bytes([1, 0]) + struct.pack("<I", len(fields)) + entries + data
 
 
-def exr(channels, compression, window=(0, 0, 2, 1), display=(0, 0, 2, 1), tiled=False, ranges=b""):
+def exr(channels, compression, window=(0, 0, 2, 1), display=(0, 0, 2, 1), tiled=False, ranges=b"", more=b""):
     """An OpenEXR file whose pixels are not compressed, which is valid for every method: it then saves nothing.
 
-    channels: pairs of name and pixel type (0: integers, 1: half, 2: float). ranges: of samples, as in merged pictures."""
+    channels: pairs of name and pixel type (0: integers, 1: half, 2: float). ranges: of samples, as in merged pictures.
+    more: the bytes of further attributes."""
 
     def attribute(name, kind, value):
         return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<I", len(value)) + value
@@ -110,6 +111,7 @@ def exr(channels, compression, window=(0, 0, 2, 1), display=(0, 0, 2, 1), tiled=
         header += attribute("samples", "double", struct.pack("<d", 8)) + attribute("sampleRanges", "string", ranges)
     if tiled:
         header += attribute("tiles", "tiledesc", struct.pack("<IIB", 4, 2, 0))
+    header += more
     width, height = window[2] - window[0] + 1, window[3] - window[1] + 1
     lines = [1, 1, 1, 16, 32, 16, 32, 32, 32, 256][compression]
     rows = height if tiled else min(height, lines)
@@ -130,6 +132,9 @@ def exr_files():
     files["cropped"] = exr(rgb, 0, window=(1, -1, 3, 0), display=(0, 0, 4, 4))
     files["tiled"] = exr(rgb, 0, tiled=True)
     files["merged"] = exr(rgb, 0, ranges=b"guided 1 0 4, path 1 8 12")
+    # Attributes whose sizes are over that of the file.
+    files["large-preview"] = exr(rgb, 0, more=b"preview\0preview\0" + struct.pack("<III", 8 + 4 * 23000**2, 23000, 23000))
+    files["large-string"] = exr(rgb, 0, more=b"xpreview\0string\0" + struct.pack("<I", 0x7FFFFFFF))
     return files
 
 

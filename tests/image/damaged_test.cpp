@@ -51,6 +51,22 @@ std::string progressiveJpeg(int scans) {
   return bytes + "\xff\xd9";
 }
 
+std::string littleEndian(std::uint32_t value) {
+  std::string bytes;
+  for (int shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(value >> shift & 0xff);
+  return bytes;
+}
+
+/// A small EXR whose first attribute claims this size.
+std::string exrWithAttribute(const std::string& name, const std::string& type, std::uint32_t size,
+                             const std::string& value) {
+  constexpr std::size_t kMagicAndVersion = 8;
+  const test::Folder folder;
+  writeImage(folder / "a.exr", Image(3, 2));
+  return test::readFile(folder / "a.exr")
+      .insert(kMagicAndVersion, name + '\0' + type + '\0' + littleEndian(size) + value);
+}
+
 Image readBytes(const std::string& name, const std::string& bytes) {
   const test::Folder folder;
   return readImage(folder.write(name, bytes));
@@ -109,6 +125,19 @@ TEST_CASE("render: an EXR whose attribute claims more bytes than the file has is
   const std::string fault = "a.exr: damaged EXR file (Attribute 'seed': Invalid size 1694498824";
   CHECK_THROWS_WITH(readImage(folder / "a.exr"), Contains(fault));
   CHECK_THROWS_WITH(readAttributes(folder / "a.exr"), Contains(fault));
+}
+
+TEST_CASE("render: an EXR with a preview that is larger than the file is rejected") {
+  constexpr std::uint32_t kSide = 23000;
+  const std::string sides = littleEndian(kSide) + littleEndian(kSide);
+  CHECK_THROWS_WITH(readBytes("a.exr", exrWithAttribute("preview", "preview", 8 + 4 * kSide * kSide, sides)),
+                    Contains("a.exr: damaged EXR file (Attribute 'preview', type 'preview': "
+                             "Invalid size for preview 23000 x 23000)"));
+}
+
+TEST_CASE("render: an EXR with a large attribute is rejected also if its name is similar to that of the preview") {
+  CHECK_THROWS_WITH(readBytes("a.exr", exrWithAttribute("xpreview", "string", 0x7fffffff, "")),
+                    Contains("a.exr: damaged EXR file (Attribute 'xpreview', type 'string': Invalid size 2147483647)"));
 }
 
 TEST_CASE("render: a JPEG with damaged Huffman tables is rejected or read, but never crashes") {
