@@ -240,7 +240,9 @@ Encoding resolved(const Encoding& encoding, std::string_view bytes) {
 
 Image readPngImage(const std::filesystem::path& path, std::string_view bytes, const Encoding& encoding, Part part) {
   const PngHeader header = nameErrors(path, [&] { return headerOfPng(bytes); });
-  checkImageSize(path, header.width, header.height, bytes.size());
+  // A byte of deflated data stands for at most 1032 bytes.
+  checkImageSize(path, header.width, header.height, bytes.size(),
+                 8 * 1032u / static_cast<unsigned>(header.bitsPerPixel));
   if (part == Part::alpha && !header.hasAlpha) failWithoutAlpha(path);
   const PngCodes pixels = nameErrors(path, [&] { return readPng(bytes); });
   const auto decodeCodes = [&](const auto& codes) {

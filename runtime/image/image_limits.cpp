@@ -22,7 +22,8 @@ void checkImageSize(const std::filesystem::path& path, std::int64_t width, std::
   checkPixelCount(path, width, height);
   if (width * height > kHarmlessPixels && static_cast<std::uintmax_t>(width * height) / mostPerByte > bytes)
     throw std::runtime_error(
-        fmt::format("{}: a file of {} bytes cannot contain {}x{} pixels", path.string(), bytes, width, height));
+        fmt::format("{}: {}x{} pixels in a file of {} bytes are over the limit of {} pixels per byte", path.string(),
+                    width, height, bytes, mostPerByte));
 }
 
 void PixelBudget::addFile(const std::filesystem::path& path) {

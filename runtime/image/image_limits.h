@@ -15,8 +15,9 @@ constexpr std::int64_t kHarmlessPixels = std::int64_t{1} << 24;
 /// Throws std::runtime_error if the image is empty or has more than 2^27 pixels.
 void checkPixelCount(const std::filesystem::path& path, std::int64_t width, std::int64_t height);
 
-/// The same, and throws if a file of this many bytes is too small for the image: even uniform images compress to no
-/// more than mostPerByte pixels per byte.
+/// The same, and throws if the image is not harmless and has more than mostPerByte pixels per byte of its file, as
+/// damaged headers claim. The default is more than uniform images compress to, except in PNG files of few bits per
+/// pixel and with DWA compression.
 void checkImageSize(const std::filesystem::path& path, std::int64_t width, std::int64_t height, std::uintmax_t bytes,
                     std::uintmax_t mostPerByte = 2000);
 

@@ -108,7 +108,7 @@ PngHeader readHeaderOf(Decoder& decoder) {
   const bool hasAlpha =
       (png_get_color_type(png, info) & PNG_COLOR_MASK_ALPHA) || png_get_valid(png, info, PNG_INFO_tRNS);
   return {static_cast<int>(png_get_image_width(png, info)), static_cast<int>(png_get_image_height(png, info)),
-          hasAlpha};
+          png_get_bit_depth(png, info) * png_get_channels(png, info), hasAlpha};
 }
 
 template <class T>

@@ -13,7 +13,8 @@ bool startsLikePng(std::string_view bytes);
 
 struct PngHeader {
   int width, height;
-  bool hasAlpha;  ///< an alpha channel, or transparent colours
+  int bitsPerPixel;  ///< in the file: of all components, or of the index of a colour
+  bool hasAlpha;     ///< an alpha channel, or transparent colours
 };
 
 /// Throws std::runtime_error if a chunk before the pixels is damaged.

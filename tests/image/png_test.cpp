@@ -172,5 +172,18 @@ TEST_CASE("image: PNG files that claim a huge size are rejected before memory is
   CHECK_THAT(fault(20000, 20000), Contains("a.png: its size of 20000x20000 pixels is over the limit of 2^27 pixels"));
   CHECK_THAT(fault(0x7fffffff, 1), Contains("its size of 2147483647x1 pixels is over the limit"));
   CHECK_THAT(fault(1, 0x7fffffff), Contains("its size of 1x2147483647 pixels is over the limit"));
-  CHECK_THAT(fault(10000, 10000), Contains("a.png: a file of") && Contains("cannot contain 10000x10000 pixels"));
+  CHECK_THAT(fault(10000, 10000), Contains("a.png: 10000x10000 pixels in a file of "));
+}
+
+TEST_CASE("image: PNG files have at most as many pixels per byte as their depth allows") {
+  const std::string rows(5000 * (1 + 5000 / 8), '\0');
+  CHECK(PngOnDisk(pngFile({5000, 5000, 1, PngColours::grey}, deflated(rows))).colours().width == 5000);
+  const auto fault = [](int depth, PngColours colours, std::size_t size) {
+    return faultOf(pngFile({5000, 5000, depth, colours}, std::string(size, 'a')));
+  };
+  const std::string tooSmall = "are over the limit of ";
+  CHECK_THAT(fault(1, PngColours::grey, 2000), Contains(tooSmall + "8256 pixels per byte"));
+  CHECK_THAT(fault(8, PngColours::rgb, 50000), Contains(tooSmall + "344 pixels per byte"));
+  CHECK_THAT(fault(16, PngColours::rgba, 100000), Contains(tooSmall + "129 pixels per byte"));
+  CHECK_THAT(fault(8, PngColours::rgb, 100000), Contains("a.png: damaged image ("));
 }

@@ -102,7 +102,7 @@ TEST_CASE("materials: invalid HDR images are rejected with the reason") {
   CHECK_THAT(faultOfImage(hdr("-Y 1 +Y 1", red(1))), Catch::Contains("same axis twice"));
   CHECK_THAT(faultOfImage(hdr("-Y 1 by 1", red(1))), Catch::Contains("found \"by 1\""));
   CHECK_THAT(faultOfImage(hdr("-Y 9999999 +X 99999999", red(1))), Catch::Contains("over the limit of 2^27 pixels"));
-  CHECK_THAT(faultOfImage(hdr("-Y 10000 +X 10000", red(1))), Catch::Contains("cannot contain 10000x10000 pixels"));
+  CHECK_THAT(faultOfImage(hdr("-Y 10000 +X 10000", red(1))), Catch::Contains("10000x10000 pixels in a file of "));
   CHECK_THAT(faultOfImage(hdr("-Y 2 +X 3", kSix.substr(0, 23))), Catch::Contains("unexpected end of file"));
   CHECK_THAT(faultOfImage("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n"), Catch::Contains("unexpected end of file"));
 }
