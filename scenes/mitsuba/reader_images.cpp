@@ -120,9 +120,9 @@ ImageStore::ImageStore(const ReadContext& context) {
     }
   parallelFor(std::size_t{0}, reads.size(), [&](std::size_t i) { *reads[i].second = read(reads[i].first); });
   if (!budget_.isExceeded()) return;
-  // Which images are within the limit depends on the order in which the threads have read them.
+  // Which images have been read depends on the order of the threads.
   for (const auto& [request, entry] : reads)
-    if (entry->image) *entry = {nullptr, budget_.fault()};
+    if (pathExists(request.path)) *entry = {nullptr, budget_.fault()};
 }
 
 ImageStore::Key ImageStore::keyOf(const ImageRequest& request) {
@@ -130,6 +130,8 @@ ImageStore::Key ImageStore::keyOf(const ImageRequest& request) {
 }
 
 ImageStore::Entry ImageStore::read(const ImageRequest& request) {
+  // It would not be used. That a file is missing is another fault.
+  if (budget_.isExceeded() && pathExists(request.path)) return {nullptr, budget_.fault()};
   try {
     Image image = request.alpha ? readAlpha(request.path) : readImage(request.path, request.encoding);
     budget_.addImage(image.pixels.size());

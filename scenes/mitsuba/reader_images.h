@@ -40,7 +40,7 @@ enum class Sign { positive, any };
 std::shared_ptr<const Image> withoutFaults(ReadContext& context, pugi::xml_node node, const ImageRequest& request,
                                            std::shared_ptr<const Image> image, Sign sign);
 
-/// The number of pixels of all its images is limited.
+/// The number of pixels of all its images is limited. No further image is read once they are over the limit.
 class ImageStore {
  public:
   /// Reads the images of all the file's bitmaps (and environment maps, if geometry is read) in parallel. Errors are
