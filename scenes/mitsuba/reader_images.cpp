@@ -62,19 +62,25 @@ Encoding encodingOf(const ReadContext& context, const Parameters& parameters) {
   return {Encoding::Kind::gamma, static_cast<float>(gamma)};
 }
 
-/// The image, or a grey one of the selected channel. For alpha, the image has been read from the alpha channel.
-std::shared_ptr<const Image> chosenChannel(const std::string& channel, std::shared_ptr<const Image> image) {
-  constexpr std::string_view kChannels = "rgb";
-  if (channel.empty() || channel == "a") return image;
-  const std::size_t index = channel.size() == 1 ? kChannels.find(channel) : std::string_view::npos;
-  if (index == std::string_view::npos && channel != "y")
+/// Throws ParameterError if there is no such channel.
+void checkChannel(const std::string& channel) {
+  constexpr std::string_view kChannels = "rgbay";
+  if (channel.size() > 1 || kChannels.find(channel) == std::string_view::npos)
     throw ParameterError("channel", fmt::format("unknown channel \"{}\"; known are r, g, b, a, y", channel));
-  if (channel == "y" && !std::ranges::all_of(image->pixels, [](const Rgb& p) { return (p == p.x()).all(); }))
-    throw ParameterError("channel", "only grey images have a channel y; this one has r, g, b");
-  if (channel == "y") return image;
-  auto chosen = std::make_shared<Image>(*image);
-  for (Rgb& pixel : chosen->pixels) pixel = grey(pixel[static_cast<Eigen::Index>(index)]);
-  return chosen;
+}
+
+bool isFaulty(const Rgb& pixel, Sign sign) {
+  return !pixel.allFinite() || (sign == Sign::positive && (pixel < 0.0f).any());
+}
+
+/// Whether there are faulty pixels; adds a note with their number.
+bool findFaulty(ReadContext& context, pugi::xml_node node, const ImageRequest& request, const Image& image, Sign sign) {
+  const auto count = std::ranges::count_if(image.pixels, [sign](const Rgb& p) { return isFaulty(p, sign); });
+  if (count > 0)
+    context.note(fmt::format("{}: {}: {} of {} pixels are {}not finite and are replaced by black", describe(node),
+                             request.path.string(), count, image.pixels.size(),
+                             sign == Sign::positive ? "negative or " : ""));
+  return count > 0;
 }
 
 }  // namespace
@@ -98,14 +104,10 @@ std::string channelOf(const Parameters& parameters) {
 
 std::shared_ptr<const Image> withoutFaults(ReadContext& context, pugi::xml_node node, const ImageRequest& request,
                                            std::shared_ptr<const Image> image, Sign sign) {
-  const auto isFaulty = [sign](const Rgb& p) { return !p.allFinite() || (sign == Sign::positive && (p < 0.0f).any()); };
-  const auto count = std::ranges::count_if(image->pixels, isFaulty);
-  if (count == 0) return image;
-  context.note(fmt::format("{}: {}: {} of {} pixels are {}not finite and are replaced by black", describe(node),
-                           request.path.string(), count, image->pixels.size(),
-                           sign == Sign::positive ? "negative or " : ""));
+  if (!findFaulty(context, node, request, *image, sign)) return image;
   auto sound = std::make_shared<Image>(*image);
-  std::ranges::replace_if(sound->pixels, isFaulty, Rgb::Zero());
+  std::ranges::replace_if(
+      sound->pixels, [sign](const Rgb& p) { return isFaulty(p, sign); }, Rgb::Zero());
   return sound;
 }
 
@@ -162,16 +164,39 @@ std::shared_ptr<const Image> ImageStore::prepared(ReadContext& context, pugi::xm
                                                   const Parameters& parameters, const ImageRequest& request,
                                                   const std::shared_ptr<const Image>& image, Sign sign) {
   const std::string channel = channelOf(parameters);
-  std::tuple key(image.get(), channel, sign);
-  if (const auto known = prepared_.find(key); known != prepared_.end()) return known->second;
-  const std::shared_ptr<const Image> result =
-      chosenChannel(channel, withoutFaults(context, node, request, image, sign));
+  checkChannel(channel);
+  const std::tuple key(image.get(), channel, sign);
+  auto known = prepared_.find(key);
+  if (known == prepared_.end())
+    known = prepared_.emplace(key, prepare(context, node, request, channel, image, sign)).first;
+  if (const auto* result = std::get_if<std::shared_ptr<const Image>>(&known->second)) return *result;
+  const auto& fault = std::get<ParameterError>(known->second);
+  if (fault.name == "channel") throw ParameterError(fault);
+  context.file.fail(parameters.location("filename"), fmt::format("{}: {}", describe(node), fault.what()));
+}
+
+ImageStore::Prepared ImageStore::prepare(ReadContext& context, pugi::xml_node node, const ImageRequest& request,
+                                         const std::string& channel, const std::shared_ptr<const Image>& image,
+                                         Sign sign) {
+  const bool hasFaulty = findFaulty(context, node, request, *image, sign);
+  const auto isGrey = [sign](const Rgb& p) { return isFaulty(p, sign) || (p == p.x()).all(); };
+  if (channel == "y" && !std::ranges::all_of(image->pixels, isGrey))
+    return ParameterError("channel", "only grey images have a channel y; this one has r, g, b");
+  // For alpha, the image has been read from the alpha channel.
+  const bool selects = channel == "r" || channel == "g" || channel == "b";
+  if (!hasFaulty && !selects) return image;
   try {
-    if (result != image) budget_.addImage(result->pixels.size());
+    budget_.addImage(image->pixels.size());
   } catch (const std::runtime_error& error) {
-    context.file.fail(parameters.location("filename"), fmt::format("{}: {}", describe(node), error.what()));
+    return ParameterError("filename", error.what());
   }
-  return prepared_.emplace(std::move(key), result).first->second;
+  auto copy = std::make_shared<Image>(*image);
+  const Eigen::Index component = channel == "r" ? 0 : channel == "g" ? 1 : 2;
+  for (Rgb& pixel : copy->pixels) {
+    if (isFaulty(pixel, sign)) pixel = Rgb::Zero();
+    if (selects) pixel = grey(pixel[component]);
+  }
+  return copy;
 }
 
 }  // namespace lobe

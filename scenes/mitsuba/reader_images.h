@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <tuple>
+#include <variant>
 #include <vector>
 
 #include "materials/parameters.h"
@@ -52,8 +53,8 @@ class ImageStore {
   std::shared_ptr<const Image> get(ReadContext& context, pugi::xml_node node, const Parameters& parameters,
                                    const ImageRequest& request, const std::string& remedy);
   /// An image made from one that get() has returned: with black in place of faulty pixels (withoutFaults), and grey if
-  /// a channel is selected. Elements that need the same image share it. Throws SceneError like get(), and
-  /// ParameterError if there is no such channel.
+  /// a channel is selected. Elements that need the same image share it, or the fault that prevents it. Throws
+  /// SceneError like get(), and ParameterError if there is no such channel.
   std::shared_ptr<const Image> prepared(ReadContext& context, pugi::xml_node node, const Parameters& parameters,
                                         const ImageRequest& request, const std::shared_ptr<const Image>& image,
                                         Sign sign);
@@ -64,12 +65,15 @@ class ImageStore {
     std::shared_ptr<const Image> image;
     std::string fault;
   };
+  /// The fault names the parameter that causes it.
+  using Prepared = std::variant<std::shared_ptr<const Image>, ParameterError>;
   static Key keyOf(const ImageRequest& request);
   Entry read(const ImageRequest& request);
+  Prepared prepare(ReadContext& context, pugi::xml_node node, const ImageRequest& request, const std::string& channel,
+                   const std::shared_ptr<const Image>& image, Sign sign);
 
   std::map<Key, Entry> entries_;
-  std::map<std::tuple<const Image*, std::string, Sign>, std::shared_ptr<const Image>>
-      prepared_;  // by image and channel
+  std::map<std::tuple<const Image*, std::string, Sign>, Prepared> prepared_;  // by image and channel
   PixelBudget budget_;
 };
 
