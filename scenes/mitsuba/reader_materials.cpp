@@ -43,6 +43,14 @@ bool namesMeasurement(pugi::xml_node node) {
   return elementName(node) == "bsdf" && (type == "measured" || type == "merl");
 }
 
+std::variant<BsdfPtr, ParameterError> bsdfOrFault(const std::string& type, const Parameters& parameters) {
+  try {
+    return makeBsdf(type, parameters);
+  } catch (const ParameterError& error) {
+    return error;
+  }
+}
+
 }  // namespace
 
 void MaterialReader::check(pugi::xml_node node) {
@@ -124,11 +132,17 @@ MaterialReader::Made MaterialReader::make(pugi::xml_node node) {
 
 MaterialReader::Made MaterialReader::makeMeasured(pugi::xml_node node, const std::string& type,
                                                   const Parameters& parameters) {
-  const std::string file = parameters.holdsText("filename") ? parameters.text("filename", "") : "";
-  const MeasuredKey key{type, file, parameters.fingerprint()};
-  if (const auto known = measured_.find(key); known != measured_.end()) return known->second;
-  const BsdfPtr bsdf = makeFrom(context_, node, parameters, [&](const Parameters& p) { return makeBsdf(type, p); });
-  return measured_.emplace(key, Made{bsdf, fingerprintOf(type, parameters, {}, *bsdf)}).first->second;
+  const BsdfPtr bsdf = makeFrom(context_, node, parameters, [&](const Parameters& p) { return readMeasured(type, p); });
+  return {bsdf, fingerprintOf(type, parameters, {}, *bsdf)};
+}
+
+BsdfPtr MaterialReader::readMeasured(const std::string& type, const Parameters& parameters) {
+  if (!parameters.holdsText("filename")) return makeBsdf(type, parameters);  // reports the error
+  const std::pair key(type, parameters.text("filename", ""));
+  auto known = measured_.find(key);
+  if (known == measured_.end()) known = measured_.emplace(key, bsdfOrFault(type, parameters)).first;
+  if (const auto* bsdf = std::get_if<BsdfPtr>(&known->second)) return *bsdf;
+  throw ParameterError(std::get<ParameterError>(known->second));
 }
 
 bool MaterialReader::resolveFile(pugi::xml_node node, Parameters& parameters) {

@@ -2,7 +2,9 @@
 // BSDF elements of scene files, and the list of those that shapes use.
 
 #include <map>
-#include <tuple>
+#include <string>
+#include <utility>
+#include <variant>
 
 #include "scenes/mitsuba/reader_textures.h"
 
@@ -41,18 +43,19 @@ class MaterialReader {
   static Made makeDiffuseOf(float reflectance);
   const Made& done(pugi::xml_node node);
   Made make(pugi::xml_node node);
-  /// A BSDF from a file, whose data it shares with an equal one that has been made before.
   Made makeMeasured(pugi::xml_node node, const std::string& type, const Parameters& parameters);
+  /// A BSDF from a file, which is its only parameter; elements with the same file share it, or its fault. Throws
+  /// ParameterError.
+  BsdfPtr readMeasured(const std::string& type, const Parameters& parameters);
   /// Resolves the file name relative to the scene. Returns false, after reporting a fault, when the file does not
   /// exist.
   bool resolveFile(pugi::xml_node node, Parameters& parameters);
 
   ReadContext& context_;
   TextureReader& textures_;
-  using MeasuredKey = std::tuple<std::string, std::string, std::uint64_t>;  // type, file, hash of the parameters
 
   std::map<std::ptrdiff_t, Made> done_;  // by location; without a BSDF while being read
-  std::map<MeasuredKey, Made> measured_;
+  std::map<std::pair<std::string, std::string>, std::variant<BsdfPtr, ParameterError>> measured_;  // by type and file
   Made circular_ = makeDiffuseOf(0.5f);      // replaces a BSDF inside itself
   std::map<std::ptrdiff_t, int> materials_;  // by location; the defaults at −1 and −2
   int unnamed_ = 0;

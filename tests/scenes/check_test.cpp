@@ -349,6 +349,22 @@ TEST_CASE("scenes: the file of a spectrum is read once") {
   CHECK(found.readable);
 }
 
+// Reading the file for each of them would take far longer than the time limit of a test.
+TEST_CASE("scenes: a faulty file of a measured material is read once") {
+  const TestFolder folder;
+  folder.write("a_rgb.bsdf", std::string(40000000, 'a'));
+  std::string body;
+  for (int i = 0; i < 50000; ++i)
+    body += fmt::format(
+        "<shape type=\"sphere\"><bsdf type=\"measured\"><string name=\"filename\" value=\"a_rgb.bsdf\"/>"
+        "<float name=\"unused\" value=\"{}\"/></bsdf></shape>",
+        i);
+  const SceneCheck found = checkScene(folder.write("test.xml", sceneOf(body)));
+  REQUIRE(found.faults.size() == 1);
+  CHECK(found.faults[0].count == 50000);
+  CHECK_THAT(found.faults[0].message, Catch::Contains("a_rgb.bsdf: not a tensor file"));
+}
+
 // Counting the column of each fault from the start of the line would take far longer than the time limit of a test.
 TEST_CASE("scenes: many faults in a single line take neither much time nor much memory") {
   const std::string comment = "<!--" + std::string(50000000, 'a') + "-->";
