@@ -7,11 +7,17 @@
 #include <string>
 #include <string_view>
 
+#include "runtime/core/vec.h"
 #include "scenes/mitsuba/reader.h"
 #include "scenes/mitsuba/scene_file.h"
-#include "scenes/mitsuba/spectra.h"
 
 namespace lobe {
+
+/// The colours of the spectrum in a file.
+struct SpectrumFile {
+  Rgb equalEnergy = Rgb::Zero(), d65 = Rgb::Zero();  ///< by how the spectrum is weighted (see Illuminant)
+  std::string fault = {};                            ///< why it cannot be read; otherwise empty
+};
 
 class ReadContext {
  public:

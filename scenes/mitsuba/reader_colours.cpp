@@ -43,29 +43,28 @@ SpectrumFile readSpectrumFile(const std::filesystem::path& path) {
     return nameErrors(path, [&]() -> SpectrumFile {
       const std::optional<SpectrumPoints> points = parseSpectrumFile(readFile(path));
       if (!points) throw std::runtime_error("each line must have a wavelength, greater than the last, and a value");
-      return {*points, ""};
+      return {rgbOfSpectrum(*points, Illuminant::equalEnergy), rgbOfSpectrum(*points, Illuminant::d65)};
     });
   } catch (const std::runtime_error& error) {
-    return {{}, error.what()};
+    return {Rgb::Zero(), Rgb::Zero(), error.what()};
   }
 }
 
-/// The spectrum in the file of this name, which is read once. Throws std::runtime_error that names it.
-const SpectrumPoints& spectrumFrom(ReadContext& context, const std::string& name, std::ptrdiff_t location) {
+/// The colour of the spectrum in the file of this name, which is read once, for an element. Throws std::runtime_error
+/// that names the file.
+Rgb colourFrom(ReadContext& context, pugi::xml_node node, const std::string& name, std::ptrdiff_t location) {
   const auto [entry, isNew] = context.spectra.try_emplace(context.file.resolve(name, location));
   SpectrumFile& file = entry->second;
   if (isNew) file = readSpectrumFile(entry->first);
   if (!file.fault.empty()) throw std::runtime_error(file.fault);
-  return file.points;
+  return illuminantOf(context, node) == Illuminant::d65 ? file.d65 : file.equalEnergy;
 }
 
 Rgb readSpectrum(ReadContext& context, pugi::xml_node node) {
   if (node.attribute("filename")) {
     checkAttributes(context, node, {"name", "filename", "intent"});
     try {
-      const SpectrumPoints& points =
-          spectrumFrom(context, node.attribute("filename").value(), SceneFile::location(node));
-      return rgbOfSpectrum(points, illuminantOf(context, node));
+      return colourFrom(context, node, node.attribute("filename").value(), SceneFile::location(node));
     } catch (const std::runtime_error& error) {
       context.file.fail(node, fmt::format("<spectrum>: {}", error.what()));
     }
@@ -136,14 +135,7 @@ std::vector<double> equallySpaced(const Parameters& parameters, std::size_t coun
   return result;
 }
 
-SpectrumPoints readCurve(ReadContext& context, const std::string& type, const Parameters& parameters) {
-  if (parameters.has("filename")) {
-    try {
-      return spectrumFrom(context, parameters.text("filename", ""), parameters.location("filename"));
-    } catch (const std::runtime_error& error) {
-      throw ParameterError("filename", error.what());
-    }
-  }
+SpectrumPoints readCurve(const std::string& type, const Parameters& parameters) {
   const std::vector<double> values = numbersIn(parameters, "values");
   const bool regular = type == "regular";
   const std::optional<SpectrumPoints> points =
@@ -156,7 +148,12 @@ SpectrumPoints readCurve(ReadContext& context, const std::string& type, const Pa
 Rgb makeCurve(ReadContext& context, pugi::xml_node node, const std::string& type, const Parameters& parameters) {
   if (parameters.has("value"))
     return parameters.colour("value", Rgb::Zero());  // wavelength:value pairs, already converted
-  return rgbOfSpectrum(readCurve(context, type, parameters), illuminantOf(context, node));
+  if (!parameters.has("filename")) return rgbOfSpectrum(readCurve(type, parameters), illuminantOf(context, node));
+  try {
+    return colourFrom(context, node, parameters.text("filename", ""), parameters.location("filename"));
+  } catch (const std::runtime_error& error) {
+    throw ParameterError("filename", error.what());
+  }
 }
 
 }  // namespace

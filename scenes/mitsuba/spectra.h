@@ -2,7 +2,6 @@
 // Converts spectra to linear Rec. 709 colours with the CIE 1931 observer.
 
 #include <optional>
-#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -13,12 +12,6 @@ namespace lobe {
 
 /// Two or more increasing wavelengths in nm, each with its value.
 using SpectrumPoints = std::vector<std::pair<double, double>>;
-
-/// A file of a spectrum.
-struct SpectrumFile {
-  SpectrumPoints points;
-  std::string fault;  ///< why it cannot be read; otherwise empty
-};
 
 /// Parses text such as "400:0.78, 500:0.6"; nullopt if it has another form.
 std::optional<SpectrumPoints> parseSpectrum(std::string_view text);

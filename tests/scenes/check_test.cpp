@@ -349,6 +349,24 @@ TEST_CASE("scenes: the file of a spectrum is read once") {
   CHECK(found.readable);
 }
 
+// Copying the spectrum for each of them would take far longer than the time limit of a test.
+TEST_CASE("scenes: the file of a spectrum is converted to a colour once") {
+  const TestFolder folder;
+  std::string lines;
+  for (int i = 1; i <= 2000000; ++i) lines += fmt::format("{} 0.5\n", i);
+  folder.write("grey.spd", lines);
+  std::string body;
+  for (int i = 0; i < 100000; ++i)
+    body +=
+        "<bsdf type=\"diffuse\"><spectrum name=\"reflectance\" type=\"irregular\">"
+        "<string name=\"filename\" value=\"grey.spd\"/></spectrum></bsdf>";
+  const std::string shape =
+      "<shape type=\"sphere\"><bsdf type=\"diffuse\"><spectrum name=\"reflectance\" "
+      "filename=\"grey.spd\"/></bsdf></shape>";
+  const Scene scene = readScene(folder.write("test.xml", sceneOf(body + shape)));
+  CHECK(albedoOf(scene, 0).isApprox(grey(0.5f), 1e-3f));
+}
+
 // Reading the file for each of them would take far longer than the time limit of a test.
 TEST_CASE("scenes: a faulty file of a measured material is read once") {
   const TestFolder folder;
