@@ -41,7 +41,7 @@ bool isNameCharacter(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) || c == '_';
 }
 
-/// Offset after the '>' of the start tag whose content begins at `begin`, after its '<'.
+/// Offset after the '>' of the tag that begins at `begin`.
 std::size_t endOfTag(std::string_view text, std::size_t begin) {
   char quote = 0;
   for (std::size_t i = begin; i < text.size(); ++i) {
@@ -55,18 +55,25 @@ std::size_t endOfTag(std::string_view text, std::size_t begin) {
   return text.size();
 }
 
-/// The text between the tags of a well-formed file's <scene>.
-TextRange bodyOfScene(std::string_view text, std::size_t root) {
-  const std::size_t begin = endOfTag(text, root);
+/// The text between the tags of an element of a well-formed file, in a tree with comments and processing instructions:
+/// then the last end tag before the next node, or else before the end of the parent, is that of the element.
+TextRange contentOf(std::string_view text, pugi::xml_node element) {
+  const std::size_t begin = endOfTag(text, static_cast<std::size_t>(SceneFile::location(element)));
   if (text[begin - 2] == '/') return {begin, begin};
-  return {begin, text.rfind("</scene")};
+  std::size_t limit = text.size();
+  if (const pugi::xml_node next = element.next_sibling())
+    limit = static_cast<std::size_t>(SceneFile::location(next));
+  else if (const pugi::xml_node parent = element.parent(); parent.type() == pugi::node_element)
+    limit = contentOf(text, parent).end;
+  return {begin, text.rfind("</", limit - 1)};
 }
 
-/// The <include> element of a well-formed file that begins there.
-TextRange rangeOfInclude(std::string_view text, std::size_t begin) {
-  std::size_t end = endOfTag(text, begin);
-  if (text[end - 2] != '/') end = endOfTag(text, text.find("</include", end));
-  return {begin, end};
+/// The element with its tags.
+TextRange rangeOf(std::string_view text, pugi::xml_node element) {
+  const TextRange content = contentOf(text, element);
+  const bool hasEndTag = text[content.begin - 2] != '/';
+  return {static_cast<std::size_t>(SceneFile::location(element)),
+          hasEndTag ? endOfTag(text, content.end) : content.end};
 }
 
 /// The first error in the XML; an empty message if there is none.
@@ -75,15 +82,19 @@ struct ParseFault {
   std::string message;
 };
 
+constexpr unsigned int kWithComments = pugi::parse_default | pugi::parse_comments | pugi::parse_pi;
+
 /// Parses the text. Returns the only <scene> at the top of the document; null if there is a fault.
-pugi::xml_node sceneIn(pugi::xml_document& document, std::string_view text, ParseFault& fault) {
+pugi::xml_node sceneIn(pugi::xml_document& document, std::string_view text, unsigned int parseOptions,
+                       ParseFault& fault) {
   const pugi::xml_parse_result result =
-      document.load_buffer(text.data(), text.size(), pugi::parse_default, pugi::encoding_utf8);
+      document.load_buffer(text.data(), text.size(), parseOptions, pugi::encoding_utf8);
   // "Error parsing start element tag" and the like, from pugixml's table.
   if (!result) fault = {static_cast<std::size_t>(result.offset), fmt::format("broken XML: {}", result.description())};
   if (!result) return {};
   pugi::xml_node scene;
   for (const pugi::xml_node node : document.children()) {
+    if (node.type() == pugi::node_comment || node.type() == pugi::node_pi) continue;
     if (scene || std::string_view(node.name()) != "scene") {
       fault = {static_cast<std::size_t>(SceneFile::location(node)),
                fmt::format("<{}> at the top level, where only one <scene> is allowed", node.name())};
@@ -120,7 +131,7 @@ SceneFile::SceneFile(const std::filesystem::path& path, const std::map<std::stri
 
 void SceneFile::parse() {
   ParseFault fault;
-  scene_ = sceneIn(document_, text_, fault);
+  scene_ = sceneIn(document_, text_, pugi::parse_default, fault);
   if (!scene_) fail(static_cast<std::ptrdiff_t>(fault.offset), fault.message);
   checkDepth();
 }
@@ -203,10 +214,10 @@ std::size_t SceneFile::addIncluded(pugi::xml_node include, std::size_t around) {
   return addFile(path, around);
 }
 
-/// Parses a file before its <include>s are replaced. Throws SceneError.
+/// Parses a file before its <include>s are replaced, with its comments. Throws SceneError.
 pugi::xml_node SceneFile::parseAlone(std::size_t file, pugi::xml_document& document) const {
   ParseFault fault;
-  const pugi::xml_node scene = sceneIn(document, files_[file].text, fault);
+  const pugi::xml_node scene = sceneIn(document, files_[file].text, kWithComments, fault);
   if (!scene) fail(startOf(file) + static_cast<std::ptrdiff_t>(fault.offset), fault.message);
   return scene;
 }
@@ -216,7 +227,7 @@ void SceneFile::expand(std::size_t file, pugi::xml_node scene, TextRange range, 
   readDefaults(scene, startOf(file));
   readFolders(scene, startOf(file));
   for (const pugi::xml_node include : scene.children("include")) {
-    const TextRange element = rangeOfInclude(files_[file].text, static_cast<std::size_t>(location(include)));
+    const TextRange element = rangeOf(files_[file].text, include);
     append(file, {range.begin, element.begin}, result);
     range.begin = element.end;
     expandInclude(include, file, result);
@@ -238,7 +249,7 @@ void SceneFile::expandInclude(pugi::xml_node include, std::size_t around, Expans
       findings_.fault(fault.where, fault.message, fault.message, "the included file is left out");
     return;
   }
-  expand(file, scene, bodyOfScene(files_[file].text, static_cast<std::size_t>(location(scene))), result);
+  expand(file, scene, contentOf(files_[file].text, scene), result);
 }
 
 void SceneFile::append(std::size_t file, TextRange range, Expansion& result) const {

@@ -169,6 +169,39 @@ TEST_CASE("scenes: includes and paths and aliases are resolved") {
   CHECK_THAT(fault("<path value='nowhere'/>"), Catch::Contains("nowhere"));
 }
 
+TEST_CASE("scenes: comments that contain end tags do not end included files and includes") {
+  const TestFolder folder;
+  const std::string shape = "<shape type='sphere'/>";
+  const auto shapes = [&](const std::string& included, const std::string& include) {
+    folder.write("part.xml", included);
+    const Scene scene = readScene(folder.write(
+        "main.xml", "<?xml version='1.0'?><!-- </scene> --><scene version='3.0.0'>" + include + shape + kSensor +
+                        "<!-- </scene> --></scene ><!-- end of </scene> -->\n<?end </scene>?>\n"));
+    return scene.shapes.size();
+  };
+  const std::string start = "<scene version='3.0.0'>", plain = "<include filename='part.xml'/>";
+  const std::string part = start + shape + "</scene>";
+  for (const std::string end : {"<!-- end of </scene> -->", "<!--</scene>-->\n<!-- a -->", "<?end </scene>?>", "\n"}) {
+    CAPTURE(end);
+    CHECK(shapes(part + end, plain) == 2);
+    CHECK(shapes(end == "\n" ? part : end + part, plain) == 2);
+    CHECK(shapes(start + shape + "<!-- </scene> --></scene\n>" + end, plain) == 2);
+    CHECK(shapes(start + "</scene>" + end, plain) == 1);
+    CHECK(shapes("<scene version='3.0.0'/>" + end, plain) == 1);
+  }
+  const std::string open = "<include filename='part.xml'>";
+  for (const std::string inside : {"", "<!-- </include> -->", "<!--</include>--> ", "<?end </include>?>"}) {
+    CAPTURE(inside);
+    const std::string include = open + inside + "</include >";
+    CHECK(shapes(part, include) == 2);
+    CHECK(shapes(part, include + "<!-- </include> -->") == 2);
+    CHECK(shapes(part, include + "\n" + include + plain) == 4);
+    folder.write("last.xml", part);
+    CHECK(shapes(start + "<include filename='last.xml'>" + inside + "</include>\n</scene><!-- </scene> -->", plain) ==
+          2);
+  }
+}
+
 TEST_CASE("scenes: emitters and films and filters and samplers at the top level can be referenced") {
   const Scene scene = readText(
       "<scene version=\"3.0.0\"><emitter type=\"area\" id=\"glow\"><rgb name=\"radiance\" value=\"3\"/></emitter>"
