@@ -53,7 +53,7 @@ FileSearch::Result FileSearch::search(const std::string& name) {
   folders.push_back(own_);
   for (const std::filesystem::path& folder : folders) {
     throwIfCancelled();
-    if (pathExists(folder / name)) return {folder / name, {}};
+    if (exists(folder, name)) return {folder / name, {}};
   }
   for (const std::filesystem::path& folder : folders) {
     throwIfCancelled();
@@ -63,12 +63,24 @@ FileSearch::Result FileSearch::search(const std::string& name) {
   return {own_ / name, {}};
 }
 
+/// Whether there is such a file. A name that is not similar to any in the listing of the folder, if that has been made,
+/// is not looked up in the file system, because there may be many of them.
+bool FileSearch::exists(const std::filesystem::path& folder, const std::string& name) const {
+  const bool isPlain = !name.empty() && name != "." && name != ".." && name.find('/') == std::string::npos;
+  if (isPlain) {
+    const auto known = listings_.find(folder.native());
+    if (known != listings_.end() && known->second.isComplete && !known->second.names.contains(lowerCase(name)))
+      return false;
+  }
+  return pathExists(folder / name);
+}
+
 /// The file that the name matches when case and the difference between '/' and '\\' are ignored, as on Windows; nullopt
 /// unless there is exactly one.
 std::optional<std::filesystem::path> FileSearch::fileOfSimilarName(std::filesystem::path folder, std::string name) {
   std::ranges::replace(name, '\\', '/');
   for (const std::filesystem::path& part : std::filesystem::path(name)) {
-    if (part.empty() || part == "." || part == ".." || part == "/" || pathExists(folder / part)) {
+    if (part.empty() || part == "." || part == ".." || part == "/" || exists(folder, part.string())) {
       folder /= part;
       continue;
     }
@@ -79,19 +91,24 @@ std::optional<std::filesystem::path> FileSearch::fileOfSimilarName(std::filesyst
   return folder;
 }
 
+/// Makes the listing if there is none yet.
+const FileSearch::Listing& FileSearch::listingOf(const std::filesystem::path& folder) {
+  if (const auto known = listings_.find(folder.native()); known != listings_.end()) return known->second;
+  Listing listing;
+  std::error_code error;
+  std::filesystem::directory_iterator entry(folder.empty() ? "." : folder, error);
+  for (; !error && entry != std::filesystem::directory_iterator(); entry.increment(error)) {
+    throwIfCancelled();
+    const std::string found = entry->path().filename().string();
+    listing.names.emplace(lowerCase(found), found);
+  }
+  listing.isComplete = !error;
+  return listings_.emplace(folder.native(), std::move(listing)).first->second;
+}
+
 /// The only entry of the folder whose name differs at most in case.
 std::optional<std::string> FileSearch::similarEntry(const std::filesystem::path& folder, const std::string& name) {
-  const auto [listing, isNew] = listings_.try_emplace(folder);
-  if (isNew) {
-    std::error_code error;
-    std::filesystem::directory_iterator entry(folder.empty() ? "." : folder, error);
-    for (; !error && entry != std::filesystem::directory_iterator(); entry.increment(error)) {
-      throwIfCancelled();
-      const std::string found = entry->path().filename().string();
-      listing->second.emplace(lowerCase(found), found);
-    }
-  }
-  const auto [first, last] = listing->second.equal_range(lowerCase(name));
+  const auto [first, last] = listingOf(folder).names.equal_range(lowerCase(name));
   return first != last && std::next(first) == last ? std::optional(first->second) : std::nullopt;
 }
 

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -37,17 +38,22 @@ class FileSearch {
   struct Folder {
     std::filesystem::path path, canonical;
   };
-  /// The names in a folder, by their spelling in lower case.
-  using Listing = std::multimap<std::string, std::string>;
+  /// The names in a folder.
+  struct Listing {
+    std::unordered_multimap<std::string, std::string> names;  ///< by their spelling in lower case
+    bool isComplete = true;                                   ///< false if the folder cannot be read
+  };
 
   Result search(const std::string& name);
+  bool exists(const std::filesystem::path& folder, const std::string& name) const;
   std::optional<std::filesystem::path> fileOfSimilarName(std::filesystem::path folder, std::string name);
+  const Listing& listingOf(const std::filesystem::path& folder);
   std::optional<std::string> similarEntry(const std::filesystem::path& folder, const std::string& name);
 
   std::filesystem::path own_;
   std::vector<Folder> folders_;
-  std::map<std::string, Result> results_;  // by name, for these folders
-  std::map<std::filesystem::path, Listing> listings_;
+  std::map<std::string, Result> results_;              // by name, for these folders
+  std::unordered_map<std::string, Listing> listings_;  // by path
 };
 
 }  // namespace lobe

@@ -18,7 +18,7 @@ namespace {
 // Limits on expansion: definitions that use each other, and files that include each other, can grow exponentially. A
 // file is looked for in all folders.
 constexpr std::size_t kLongestValue = 1 << 20, kMostIncludes = 1000, kLongestText = std::size_t{1} << 28,
-                      kMostFolders = 1000;
+                      kMostFolders = 100;
 
 const std::string& nameOf(const std::string& name) {
   return name;
