@@ -270,10 +270,12 @@ void ShapeReader::addMesh(int group, pugi::xml_node node, Mesh mesh, const std::
 }
 
 void ShapeReader::readMeshes() {
+  for (const Mesh& mesh : meshes_) budget_.addFile(mesh.source.path);
   parallelFor(std::size_t{0}, meshes_.size(), [this](std::size_t i) {
     read(meshes_[i]);
     if (context_.options.onProgress) context_.options.onProgress(1.0 / static_cast<double>(meshes_.size()));
   });
+  if (budget_.isExceeded()) leaveOutMeshes();
   for (const Mesh& mesh : meshes_) reportFault(mesh);
   clearInstancesOutOfRange();
   for (const Mesh& mesh : meshes_) noteUnusedMaterials(mesh);
@@ -292,14 +294,25 @@ void ShapeReader::dropDuplicates(Shape& shape) {
 }
 
 void ShapeReader::read(Mesh& mesh) {
+  if (budget_.isExceeded()) return;
   try {
     std::vector<TriangleMesh> parts = lobe::readMeshes(mesh.source, mesh.options);
+    for (const TriangleMesh& part : parts) budget_.addMesh(part.triangles.size(), part.positions.size());
     for (std::size_t i = 0; i < parts.size(); ++i)
       shapesOf(mesh.shapes[i].group)[mesh.shapes[i].index].geometry = std::move(parts[i]);
   } catch (const std::bad_alloc&) {
     throw;  // no fault of the file, so lenient reading must not go on without the mesh
   } catch (const std::exception& error) {
     mesh.fault = error.what();
+  }
+}
+
+/// Which meshes have been read within the limit, or have other faults, depends on the order in which the threads have
+/// read them.
+void ShapeReader::leaveOutMeshes() {
+  for (Mesh& mesh : meshes_) {
+    mesh.fault = budget_.fault();
+    for (const Place& place : mesh.shapes) shapesOf(place.group)[place.index].geometry = TriangleMesh();
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <map>
 
+#include "scenes/meshes/mesh_budget.h"
 #include "scenes/meshes/mesh_options.h"
 #include "scenes/meshes/mesh_source.h"
 #include "scenes/mitsuba/reader_materials.h"
@@ -12,12 +13,19 @@ namespace lobe {
 
 class ShapeReader {
  public:
-  ShapeReader(ReadContext& context, TextureReader& textures, MaterialReader& materials)
-      : context_(context), textures_(textures), materials_(materials), objMaterials_(context, textures, materials) {}
+  /// harmless: the number of triangles and vertices of all meshes that is accepted whatever the sizes of their files.
+  ShapeReader(ReadContext& context, TextureReader& textures, MaterialReader& materials,
+              std::uintmax_t harmless = MeshBudget::kHarmless)
+      : context_(context),
+        textures_(textures),
+        materials_(materials),
+        objMaterials_(context, textures, materials),
+        budget_(harmless) {}
 
   /// Adds the shape to the scene; its mesh is left for readMeshes. Throws SceneError.
   void add(pugi::xml_node node);
   /// Reads the meshes of all shapes added, in parallel. A mesh that cannot be read is reported as a fault and left out.
+  /// If the meshes exceed the limit of MeshBudget together, reading ends, and this applies to all of them.
   void readMeshes();
   /// Reports a fault for each instance that rays cannot be traced in, and leaves it out. The scene must have its final
   /// scale.
@@ -58,6 +66,7 @@ class ShapeReader {
     return group < 0 ? context_.scene.shapes : context_.scene.groups[static_cast<std::size_t>(group)].shapes;
   }
   void read(Mesh& mesh);
+  void leaveOutMeshes();
   void reportFault(const Mesh& mesh);
   /// Reports a fault for each instance whose group is too far away, and clears the instance.
   void clearInstancesOutOfRange();
@@ -71,6 +80,7 @@ class ShapeReader {
   MaterialReader& materials_;
   ObjMaterialReader objMaterials_;
   std::vector<Mesh> meshes_;
+  MeshBudget budget_;
   // Those in the scene: index into its shapes, valid until dropEmpty, and location in the file.
   std::vector<std::pair<std::size_t, std::ptrdiff_t>> instances_;
   std::map<std::ptrdiff_t, int> groups_;  // by location in the file

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "scenes/mitsuba/reader_shapes.h"
 #include "tests/support/scenes_test_tools.h"
 
 using namespace lobe;
@@ -56,6 +57,34 @@ BsdfPtr bsdfOfMtl(const std::string& statements) {
 
 bool isNear(const Rgb& a, const Rgb& b, float tolerance = 1e-5f) {
   return (a - b).abs().maxCoeff() <= tolerance;
+}
+
+struct ReadShapes {
+  Scene scene;
+  std::vector<Fault> faults;
+};
+
+/// Reads the shapes of a scene whose meshes may have 20 triangles and vertices for each byte of their files, also if
+/// that are few.
+ReadShapes readShapes(const std::filesystem::path& path) {
+  Findings findings;
+  const SceneFile file(path, {}, findings);
+  const ReadOptions options = {};
+  ReadShapes read;
+  ReadContext context(file, options, read.scene, findings);
+  TextureReader textures(context);
+  MaterialReader materials(context, textures);
+  ShapeReader shapes(context, textures, materials, 0);
+  for (const pugi::xml_node node : file.scene().children("shape")) shapes.add(node);
+  shapes.readMeshes();
+  read.faults = findings.faults();
+  return read;
+}
+
+std::string repeated(int times, const std::string& text) {
+  std::string result;
+  for (int i = 0; i < times; ++i) result += text;
+  return result;
 }
 
 /// A BMP with a single pixel.
@@ -291,6 +320,43 @@ TEST_CASE("scenes: all files that a scene names are known") {
       "test.xml", "<scene version=\"0.6.0\"><include filename=\"part.xml\"/>" + sceneOfObj("").substr(23)));
   for (const char* name : {"a.obj", "colours.mtl", "red.tga", "part.xml"})
     CHECK(std::ranges::count(read.files, scene.folder.path() / name) == 1);
+}
+
+TEST_CASE("scenes: the meshes of all shapes together are limited") {
+  const TestFolder folder;
+  const std::string obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";  // 4 triangles and vertices
+  folder.write("a.obj", obj);
+  folder.write("b.obj", obj);
+  std::filesystem::create_symlink("a.obj", folder.path() / "link.obj");
+  const auto shape = [](const std::string& name) {
+    return "<shape type=\"obj\"><string name=\"filename\" value=\"" + name + "\"/></shape>";
+  };
+  const auto read = [&](const std::string& body) { return readShapes(folder.write("test.xml", sceneOf(body))); };
+  const std::size_t limit = 20 * obj.size();
+  const int most = static_cast<int>(limit / 4);
+
+  const ReadShapes within = read(repeated(most, shape("a.obj")));
+  CHECK(within.faults.empty());
+  CHECK(within.scene.shapes.size() == static_cast<std::size_t>(most));
+  CHECK(read(repeated(most, shape("a.obj") + shape("b.obj"))).faults.empty());
+
+  const std::string others = shape("none.obj") + shape("./a.obj") + shape("link.obj") + "<shape type=\"sphere\"/>";
+  const ReadShapes beyond = read(repeated(most, shape("a.obj")) + others);
+  REQUIRE(beyond.faults.size() == 1);
+  CHECK(beyond.faults[0].count == static_cast<std::size_t>(most) + 3);
+  CHECK_THAT(beyond.faults[0].where, Catch::EndsWith("test.xml:2:19"));
+  CHECK(
+      beyond.faults[0].message ==
+      fmt::format("shape \"obj\": the meshes of the scene have more than {} triangles and vertices together, the limit "
+                  "for {} bytes of mesh files",
+                  limit, obj.size()));
+  REQUIRE(beyond.scene.shapes.size() == 1);
+  CHECK(std::holds_alternative<Sphere>(beyond.scene.shapes[0].geometry));
+
+  const std::string group = "<shape type=\"shapegroup\" id=\"g\">" + shape("a.obj") + "</shape>";
+  const ReadShapes placed = read(group + repeated(2 * most, "<shape type=\"instance\"><ref id=\"g\"/></shape>"));
+  CHECK(placed.faults.empty());
+  CHECK(placed.scene.shapes.size() == static_cast<std::size_t>(2 * most));
 }
 
 // Moving the other shapes for each of them would take far longer than the time limit of a test.
