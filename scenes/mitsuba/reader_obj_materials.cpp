@@ -13,7 +13,7 @@
 namespace lobe {
 std::vector<std::pair<std::string, int>> ObjMaterialReader::read(pugi::xml_node shape, std::ptrdiff_t location,
                                                                  const MeshSource& source) {
-  const ObjMaterials found = find(location, source);
+  const ObjMaterials& found = find(location, source);
   if (found.library.empty()) return {};
   Place place{shape, location, source.path.parent_path(), {}};
   place.library = resolve(place, found.library);
@@ -27,11 +27,13 @@ std::vector<std::pair<std::string, int>> ObjMaterialReader::read(pugi::xml_node 
   return result;
 }
 
-ObjMaterials ObjMaterialReader::find(std::ptrdiff_t location, const MeshSource& source) const {
+const ObjMaterials& ObjMaterialReader::find(std::ptrdiff_t location, const MeshSource& source) {
+  const std::tuple key(source.path, source.obj.mesh, source.obj.grouping);
+  if (const auto known = found_.find(key); known != found_.end()) return known->second;
   const std::string text = textOf(location, source.path, "shape \"obj\"");
   ObjMaterials found = findObjMaterials(text, source.obj.mesh);
   if (source.obj.grouping == ObjGrouping::collapsed) found.names = {found.last};
-  return found;
+  return found_.emplace(key, std::move(found)).first->second;
 }
 
 std::string ObjMaterialReader::textOf(std::ptrdiff_t location, const std::filesystem::path& path,
@@ -80,7 +82,7 @@ ObjMaterialReader::Library ObjMaterialReader::readLibrary(const Place& place) co
 }
 
 int ObjMaterialReader::use(const Place& place, const MtlMaterial& material) {
-  const std::pair key(place.library, material.name);
+  const std::pair key(material.name, place.library);
   if (const auto known = used_.find(key); known != used_.end()) return known->second;
   const int index = materials_.add(material.name, make(place, material));
   return used_.emplace(key, index).first->second;

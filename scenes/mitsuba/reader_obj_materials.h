@@ -3,6 +3,7 @@
 
 #include <map>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -33,7 +34,8 @@ class ObjMaterialReader {
     std::filesystem::path library;  ///< empty if there is none
   };
 
-  ObjMaterials find(std::ptrdiff_t location, const MeshSource& source) const;
+  /// The materials that the selected faces name. A file is read once for all shapes with the same selection.
+  const ObjMaterials& find(std::ptrdiff_t location, const MeshSource& source);
   /// The content of a file. what: of the message of the SceneError that is thrown if it cannot be read.
   std::string textOf(std::ptrdiff_t location, const std::filesystem::path& path, const std::string& what) const;
   /// Path of a file that the OBJ or its library names: in the folder of the OBJ, or where files of the scene are
@@ -57,8 +59,10 @@ class ObjMaterialReader {
   ReadContext& context_;
   TextureReader& textures_;
   MaterialReader& materials_;
+  std::map<std::tuple<std::filesystem::path, int, ObjGrouping>, ObjMaterials> found_;  // by file and selection
   std::map<std::filesystem::path, Library> libraries_;
-  std::map<std::pair<std::filesystem::path, std::string>, int> used_;  // by library and name
+  // By name and library. Names differ more often than paths, and are quicker to compare.
+  std::map<std::pair<std::string, std::filesystem::path>, int> used_;
 };
 
 }  // namespace lobe

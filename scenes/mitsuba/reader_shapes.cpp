@@ -261,12 +261,25 @@ void ShapeReader::addMesh(int group, pugi::xml_node node, Mesh mesh, const std::
     add(fmt::format("{}:{}", name, material), materials_.use(bsdf));
   }
   if (mesh.loadMaterials && !parts.bsdf)
-    for (const auto& [material, index] : objMaterials_.read(node, mesh.location, mesh.source)) {
+    for (const auto& [material, index] : libraryMaterials(node, mesh)) {
       mesh.source.obj.materials.push_back(material);
       add(fmt::format("{}:{}", name, material), index);
     }
   add(name, materialOf(parts));
   meshes_.push_back(std::move(mesh));
+}
+
+/// Each material is a shape of its own, and many shapes can name one OBJ with many materials.
+std::vector<std::pair<std::string, int>> ShapeReader::libraryMaterials(pugi::xml_node node, const Mesh& mesh) {
+  constexpr std::size_t kMost = std::size_t{1} << 18;
+  std::vector<std::pair<std::string, int>> found;
+  if (libraryMaterials_ <= kMost) found = objMaterials_.read(node, mesh.location, mesh.source);
+  libraryMaterials_ += found.size();
+  if (libraryMaterials_ > kMost)
+    context_.file.fail(
+        mesh.location,
+        fmt::format("the shapes of the scene have more than {} materials from libraries of OBJ files together", kMost));
+  return found;
 }
 
 void ShapeReader::readMeshes() {

@@ -61,6 +61,8 @@ class ShapeReader {
   void takeEmitter(pugi::xml_node node, Parts& parts);
   Mesh makeMesh(const std::string& type, const Parameters& parameters, const MeshOptions& options);
   void addMesh(int group, pugi::xml_node node, Mesh mesh, const std::string& name, const Parts& parts);
+  /// Those of the OBJ's library. Throws SceneError if the shapes of the scene use too many of them.
+  std::vector<std::pair<std::string, int>> libraryMaterials(pugi::xml_node node, const Mesh& mesh);
   int materialOf(const Parts& parts);
   std::vector<Shape>& shapesOf(int group) {
     return group < 0 ? context_.scene.shapes : context_.scene.groups[static_cast<std::size_t>(group)].shapes;
@@ -79,6 +81,7 @@ class ShapeReader {
   TextureReader& textures_;
   MaterialReader& materials_;
   ObjMaterialReader objMaterials_;
+  std::size_t libraryMaterials_ = 0;  // used by all shapes
   std::vector<Mesh> meshes_;
   MeshBudget budget_;
   // Those in the scene: index into its shapes, valid until dropEmpty, and location in the file.

@@ -359,6 +359,26 @@ TEST_CASE("scenes: the meshes of all shapes together are limited") {
   CHECK(placed.scene.shapes.size() == static_cast<std::size_t>(2 * most));
 }
 
+TEST_CASE("scenes: the materials that all shapes have from libraries are limited") {
+  constexpr int kMaterials = 1 << 13;
+  std::string library, obj = "mtllib colours.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n";
+  for (int i = 0; i < kMaterials; ++i) {
+    library += fmt::format("newmtl {}\n", i);
+    obj += fmt::format("usemtl {}\nf 1 2 3\n", i);
+  }
+  const ObjScene files(library, obj);
+  const std::string shape = "<shape type=\"obj\"><string name=\"filename\" value=\"a.obj\"/></shape>\n";
+  ReadOptions options;
+  options.geometry = false;
+  // 32 of the shapes are within the limit of 2^18.
+  const std::string text = "<scene version=\"0.6.0\">\n" + repeated(35, shape) + "</scene>";
+  const SceneCheck found = checkScene(files.folder.write("test.xml", text), options);
+  REQUIRE(found.faults.size() == 1);
+  CHECK(found.faults[0].count == 3);
+  CHECK_THAT(found.faults[0].where, Catch::EndsWith("test.xml:34:19"));
+  CHECK_THAT(found.faults[0].message, Contains("more than 262144 materials from libraries of OBJ files"));
+}
+
 // Moving the other shapes for each of them would take far longer than the time limit of a test.
 TEST_CASE("scenes: many shapes without a face are removed in linear time", "[slow]") {
   constexpr int kEmpty = 400000;
