@@ -98,9 +98,9 @@ inline std::array<Box, 2> halves(const Box& box, int axis) {
 }
 
 /// Integrates a density over boxes by recursive bisection. A quadrature rule that misses a narrow lobe reports no
-/// error, so the samples control the refinement, too: a box is also halved if it contains many samples, or if the rule
-/// finds almost no mass in spite of some samples, along the axis on which the samples span the smaller fraction of the
-/// box.
+/// error, so the samples control the refinement, too: a box is also halved if it contains many samples, if the rule
+/// finds almost no mass in spite of some samples, or if the density at a sample is far above the mean that the rule
+/// finds; along the axis on which the samples span the smaller fraction of the box.
 template <typename Density>
 class Quadrature {
  public:
@@ -116,7 +116,9 @@ class Quadrature {
       const double x = halved(box, 0);
       const double y = halved(box, 1);
       const double error = std::max(std::abs(x - whole), std::abs(y - whole));
-      const bool plausible = 0.5 * (x + y) * samples_ >= 0.02 * static_cast<double>(points.size());
+      const double mass = 0.5 * (x + y);
+      const bool plausible =
+          mass * samples_ >= 0.02 * static_cast<double>(points.size()) && !missesPeak(box, points, mass);
       if (depth == kMaxDepth || (plausible && error < kTolerance)) return x + y - whole;
       if (plausible) axis = std::abs(x - whole) > std::abs(y - whole) ? 0 : 1;
     }
@@ -128,6 +130,12 @@ class Quadrature {
   }
 
  private:
+  bool missesPeak(const Box& box, std::span<const Point> points, double mass) const {
+    constexpr double kPeak = 16;
+    const double area = (box.high - box.low).prod();
+    return std::ranges::any_of(points, [&](const Point& p) { return density_(p) * area > kPeak * mass; });
+  }
+
   double halved(const Box& box, int axis) const {
     const std::array<Box, 2> parts = halves(box, axis);
     return gauss(density_, parts[0]) + gauss(density_, parts[1]);
