@@ -114,7 +114,7 @@ TEST_CASE("materials: samples of narrow lobes match their density for alpha 0.00
     }
 }
 
-TEST_CASE("materials: samples of every model match its density") {
+TEST_CASE("materials: samples of every model match its density", "[heavy]") {
   const BsdfPtr diffuse = bsdfOf("diffuse");
   const BsdfPtr plastic = bsdfOf("plastic");
   const BsdfPtr shiny = bsdfOf("roughplastic", {{"alpha", 0.05}, {"distribution", std::string("ggx")}});

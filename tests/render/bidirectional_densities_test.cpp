@@ -59,7 +59,7 @@ TEST_CASE("bidirectional: a wrong density of either subpath is detected") {
   CHECK_FALSE(agree(path, renderBlocks(stage, WrongBdpt(stage, 1, 1.2f), {48, 12, 1000})));
 }
 
-TEST_CASE("light paths: a wrong density of any technique is detected") {
+TEST_CASE("light paths: a wrong density of any technique is detected", "[heavy]") {
   // The ball makes caustics; the environment is sampled through it, too.
   const Stage stage(sceneWith(std::string(kFloor) + kLamp + R"(
     <shape type="sphere"><point name="center" x="0.8" y="-0.3" z="1"/><float name="radius" value="0.9"/>

@@ -125,7 +125,7 @@ TEST_CASE("bidirectional: shading normals inside glass give the image of path tr
   CHECK(agree(path, renderBlocks(stage, stage.pathWithLight(), {48, 24, 2000})));
 }
 
-TEST_CASE("bidirectional: the caustic of a glass ball under a small lamp is that of path tracing") {
+TEST_CASE("bidirectional: the caustic of a glass ball under a small lamp is that of path tracing", "[heavy]") {
   const Stage stage(sceneWith(std::string(kFloor) + R"(
     <shape type="sphere"><point name="center" x="0.8" y="-0.3" z="1"/><float name="radius" value="0.6"/>
       <bsdf type="dielectric"/></shape>
@@ -186,7 +186,7 @@ TEST_CASE("bidirectional: every kind of camera gives the image of path tracing",
   CHECK(agreesWithPath(Stage(sceneWith(std::string(kFloor) + kLamp, camera))));
 }
 
-TEST_CASE("bidirectional: dark and hidden emitters and the maximum depth give the image of path tracing") {
+TEST_CASE("bidirectional: dark and hidden emitters and the maximum depth give the image of path tracing", "[heavy]") {
   const std::string lamp = R"(<shape type="sphere"><point name="center" x="0.3" y="-0.5" z="1.5"/><ref id="grey"/>
     <float name="radius" value="0.5"/><emitter type="area"><rgb name="radiance" value="9, 8, 7"/></emitter></shape>)";
   Stage stage(sceneWith(kFloor + lamp));
@@ -202,7 +202,7 @@ TEST_CASE("bidirectional: dark and hidden emitters and the maximum depth give th
   CHECK(agreesWithPath(stage));
 }
 
-TEST_CASE("bidirectional: the radiance in a furnace is emission over one minus albedo") {
+TEST_CASE("bidirectional: the radiance in a furnace is emission over one minus albedo", "[heavy]") {
   const float emission = 0.5f, albedo = 0.6f;
   Scene scene = sceneWith("");
   scene.camera.toWorld.setIdentity();

@@ -57,7 +57,7 @@ TEST_CASE("light paths: light whose solid angle a refracting surface changes giv
   CHECK(agree(path, renderBlocks(stage, stage.pathWithLight(4), {48, 12, 2000})));
 }
 
-TEST_CASE("light paths: light of delta lights through glass gives the image of bidirectional path tracing") {
+TEST_CASE("light paths: light of delta lights through glass gives the image of bidirectional path tracing", "[heavy]") {
   // Camera paths do not find it. The camera does not see the slab, through which it would see light that only
   // connections find.
   const auto [name, light] = GENERATE(table<std::string, std::string>(
@@ -76,7 +76,7 @@ TEST_CASE("light paths: light of delta lights through glass gives the image of b
   CHECK(agree(bdpt, renderBlocks(stage, stage.pathWithLight(0.25), {48, 24, 2000})));
 }
 
-TEST_CASE("light paths: guided emission of the environment gives the image of path tracing") {
+TEST_CASE("light paths: guided emission of the environment gives the image of path tracing", "[heavy]") {
   Scene scene = sceneWith(std::string(kFloor) + kLamp + R"(<shape type="sphere">
     <point name="center" x="0.8" y="-0.3" z="1"/><float name="radius" value="0.9"/><bsdf type="dielectric"/></shape>)");
   scene.environment = brightSpot();

@@ -127,7 +127,7 @@ Scene manyLights(int side) {
 
 }  // namespace
 
-TEST_CASE("render: light samples follow their density at several places, without and with learning") {
+TEST_CASE("render: light samples follow their density at several places, without and with learning", "[heavy]") {
   const Scene scene = litFloor();
   RenderScene ready(scene);
   REQUIRE(ready.lights.clusters() > 100);

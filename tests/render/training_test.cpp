@@ -191,7 +191,7 @@ TEST_CASE("training: guided photons estimate the same flux as unguided ones with
   CHECK(guidedError < 0.9 * plainError);  // 0.77 in our measurement
 }
 
-TEST_CASE("training: camera paths and photons agree on the directional distribution of light") {
+TEST_CASE("training: camera paths and photons agree on the directional distribution of light", "[heavy]") {
   Scene scene = roomScene();
   SECTION("indirect") {}
   SECTION("via a half mirror") {
@@ -275,7 +275,7 @@ TEST_CASE("training: learns the light of the paths of the picture, and not that 
   CHECK(equals(found, irradiance));
 }
 
-TEST_CASE("training: camera paths and photons agree on the light of paths of limited length") {
+TEST_CASE("training: camera paths and photons agree on the light of paths of limited length", "[heavy]") {
   Scene scene = roomScene();
   SECTION("of two reflections") {}
   SECTION("via a half mirror") {

@@ -115,7 +115,7 @@ TEST_CASE("transmission: radiance is scaled by the square of the index where onl
   CHECK(followed.error() < 0.7 * chance.error());
 }
 
-TEST_CASE("transmission: area lights are found through panes and half-open masks") {
+TEST_CASE("transmission: area lights are found through panes and half-open masks", "[heavy]") {
   const char* type = GENERATE("thindielectric", "mask", "dielectric");
   CAPTURE(type);
   Scene scene = smallReceiver();
