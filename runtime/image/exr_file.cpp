@@ -8,6 +8,8 @@
 #include <string_view>
 #include <type_traits>
 
+#include <ImfHeader.h>
+#include <ImfInputFile.h>
 #include <fmt/format.h>
 #include <openexr.h>
 
@@ -21,10 +23,11 @@ namespace {
 using Fault = std::array<char, 256>;
 
 /// OpenEXRCore only warns of these, and Imf::InputFile would allocate memory for a wrong size, or use another copy of
-/// the attribute. The size of a preview without pixels is right, although OpenEXRCore reports it.
+/// the attribute. After a bad header, such as an attribute without a type, OpenEXRCore ignores the attributes that
+/// follow. The size of a preview without pixels is right, although OpenEXRCore reports it.
 bool isHarmful(exr_result_t code, std::string_view message) {
   const bool isEmptyPreview = message.ends_with("Invalid size for preview 0 x 0");
-  return (code == EXR_ERR_ATTR_SIZE_MISMATCH && !isEmptyPreview) ||
+  return code == EXR_ERR_FILE_BAD_HEADER || (code == EXR_ERR_ATTR_SIZE_MISMATCH && !isEmptyPreview) ||
          message.starts_with("Duplicate copy of required attribute");
 }
 
@@ -118,27 +121,42 @@ void checkStorage(const std::filesystem::path& path, exr_const_context_t file) {
     throw std::runtime_error(fmt::format("{}: deep EXR images are not supported", path.string()));
 }
 
-/// OpenEXRCore reports sizes of attributes that do not fit the file or the type, which Imf::InputFile does not.
-void checkHeader(const std::filesystem::path& path) {
+struct Windows {
+  exr_attr_box2i_t data{}, display{};
+};
+
+/// OpenEXRCore reports sizes of attributes that do not fit the file or the type, which Imf::InputFile does not. Returns
+/// the windows that are within the limits.
+Windows checkHeader(const std::filesystem::path& path) {
   const Context context = openHeader(path);
   const exr_context_t opened = context.get();
   checkStorage(path, opened);
-  exr_attr_box2i_t data{}, display{};
+  Windows windows;
   // Imf::InputFile reads the first part.
-  exr_get_data_window(opened, 0, &data);
-  exr_get_display_window(opened, 0, &display);
+  exr_get_data_window(opened, 0, &windows.data);
+  exr_get_display_window(opened, 0, &windows.display);
   const std::uintmax_t length = std::filesystem::file_size(path);
-  const Size size(data);
+  const Size size(windows.data);
   checkDataWindow(path, opened, size, length);
-  checkDisplayWindow(path, size, Size(display));
+  checkDisplayWindow(path, size, Size(windows.display));
   checkBlocks(path, opened, size.width, length);
+  return windows;
+}
+
+bool isEqual(const exr_attr_box2i_t& a, const Imath::Box2i& b) {
+  return a.min.x == b.min.x && a.min.y == b.min.y && a.max.x == b.max.x && a.max.y == b.max.y;
 }
 
 }  // namespace
 
 std::unique_ptr<Imf::InputFile> openExr(const std::filesystem::path& path) {
-  checkHeader(path);
-  return nameExrErrors(path, [&] { return std::make_unique<Imf::InputFile>(path.c_str()); });
+  const Windows checked = checkHeader(path);
+  std::unique_ptr<Imf::InputFile> file =
+      nameExrErrors(path, [&] { return std::make_unique<Imf::InputFile>(path.c_str()); });
+  // The libraries may take different bytes of a damaged header for the windows.
+  if (!isEqual(checked.data, file->header().dataWindow()) || !isEqual(checked.display, file->header().displayWindow()))
+    throw std::runtime_error(fmt::format("{}: damaged EXR file (its windows are ambiguous)", path.string()));
+  return file;
 }
 
 }  // namespace lobe

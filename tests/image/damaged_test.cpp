@@ -141,6 +141,12 @@ TEST_CASE("render: an EXR with a large attribute is rejected also if its name is
                     Contains("a.exr: damaged EXR file (Attribute 'xpreview', type 'string': Invalid size 2147483647)"));
 }
 
+TEST_CASE("render: an EXR with an attribute without a type is rejected, because those after it are not checked") {
+  CHECK_THROWS_WITH(readBytes("a.exr", exrWithAttribute("x", "", 0, "")),
+                    Contains("a.exr: damaged EXR file (Invalid empty string encountered parsing attribute type for "
+                             "attribute 'x')"));
+}
+
 TEST_CASE("render: a JPEG with damaged Huffman tables is rejected or read, but never crashes") {
   const std::string bytes = test::pictureFile("jpg", 17, 13, test::noiseCodes(17, 13));
   CHECK(readBytes("a.jpg", bytes).height == 13);
