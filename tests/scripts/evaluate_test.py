@@ -550,8 +550,8 @@ def main():
         make_tools(folder / "tools")
         for check in (check_plan, check_refused, check_continued, check_interrupted, check_repeated, check_progress, check_pairs,
                       check_plan_last, check_black, check_usage, check_import, check_import_only, check_markdown, check_update,
-                      check_results, check_comparison, check_comparison_usage, check_charts, check_long_run, check_missing_errors, check_reference, check_made_references,
-                      check_resumed_references):
+                      check_results, check_comparison, check_comparison_usage, check_charts, check_long_run, check_missing_errors,
+                      check_reference, check_made_references, check_resumed_references):
             check(folder)
             print(check.__name__, "passed", flush=True)
     return 0
