@@ -77,7 +77,7 @@ def check_markdown(out):
     assert costs[0] == f"| scene, budget | method | {columns} |", costs
     for line in costs[2:]:
         assert 0 < float(line.split("|")[-2]) < 9, f"not a mean relative to that of nine groups: {line}"
-    assert len(costs) == 2 + 9 and any(line.startswith("| jewelry, spp 4 | a:path | 4 | ") for line in costs), costs
+    assert len(costs) == 2 + 9 and any(line.startswith("| jewelry, 4 samples | a:path | 4 | ") for line in costs), costs
 
 
 def open_page(page):
