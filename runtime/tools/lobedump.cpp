@@ -62,8 +62,9 @@ void declare(CLI::App& app, Options& o) {
           ->excludes(records)
           ->excludes(json)
           ->excludes("--diff");
-  app.add_option("--record", o.record,
-                 "Index of the only record to plot (default: up to five, from the first to the last)")
+  app.add_option(
+         "--record", o.record,
+         "Index of the only record to plot (default: up to five of those with a fit, from the first to the last)")
       ->check(CLI::NonNegativeNumber)
       ->default_str("")
       ->needs(plot);
@@ -173,15 +174,26 @@ std::string noLobe(const LobeCache& cache, const std::string& file, const Option
       o.scene, file, cache.info().summary, cache.info().key);
 }
 
-std::vector<int> chosenRecords(const LobeCache& cache, const Options& o) {
+/// The indices of the records that have a fit; of the one of --record only, if it is given.
+std::vector<int> recordsWithFit(const LobeCache& cache, const Options& o) {
   const int count = static_cast<int>(cache.records().size());
   if (o.record >= count) throw UsageError(fmt::format("--record must be from 0 to {}", count - 1));
-  std::vector<int> records = o.record >= 0 ? std::vector{o.record} : spreadRecords(count, kPlotRows);
-  if (std::ranges::any_of(records, [&](int i) { return !graded(cache.records()[static_cast<std::size_t>(i)]); }))
-    throw std::runtime_error(
-        fmt::format("{}: {} has a record that is left to BSDF sampling, so there is no fit to draw", o.files[0],
-                    cache.info().summary));
+  std::vector<int> records;
+  for (int i = 0; i < count; ++i)
+    if ((o.record < 0 || o.record == i) && graded(cache.records()[static_cast<std::size_t>(i)])) records.push_back(i);
   return records;
+}
+
+std::vector<int> chosenRecords(const LobeCache& cache, const Options& o) {
+  const std::vector<int> fits = recordsWithFit(cache, o);
+  if (fits.empty())
+    throw std::runtime_error(fmt::format("{} ({}): {} left to BSDF sampling, so there is no fit to draw", o.files[0],
+                                         cache.info().summary,
+                                         o.record < 0 ? "all records are" : fmt::format("record {} is", o.record)));
+  std::vector<int> chosen;
+  for (const int i : spreadRecords(static_cast<int>(fits.size()), kPlotRows))
+    chosen.push_back(fits[static_cast<std::size_t>(i)]);
+  return chosen;
 }
 
 std::string pointText(const Vec2& y) {

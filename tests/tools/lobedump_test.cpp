@@ -4,6 +4,7 @@
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <sstream>
 
 #include "fitter/disc_mass.h"
 #include "fitter/lobe_fit.h"
@@ -65,6 +66,42 @@ LobeCache singleRecord(const fs::path& path, const Lobe& lobe, const Gaussian& g
                                         std::vector{CacheComponent{1, g.meanX, g.meanY, g.cov.xx, g.cov.xy, g.cov.yy}},
                                         std::vector<std::uint32_t>{0}));
   return LobeCache::open(path);
+}
+
+/// Writes a cache with one record per direction of its grid: of one Gaussian where fitted is true, otherwise without a
+/// mixture, that is, left to BSDF sampling.
+void writePartlyFitted(const fs::path& path, const std::vector<bool>& fitted) {
+  LobeCacheInfo info;
+  info.model = info.key = info.summary = info.toolVersion = "partial";
+  info.gridCount = static_cast<std::uint32_t>(fitted.size());
+  const Gaussian g{1, 0, 0, {0.04f, 0, 0.04f}};
+  std::vector<CacheRecord> records(fitted.size());
+  std::vector<CacheComponent> components;
+  std::vector<std::uint32_t> lookup(fitted.size());
+  for (std::uint32_t i = 0; i < info.gridCount; ++i) {
+    lookup[i] = i;
+    CacheRecord& r = records[i];
+    r.entry = i;
+    r.integral = r.albedo = 0.9f;
+    if (!fitted[i]) continue;
+    r.first = static_cast<std::uint32_t>(components.size());
+    r.count = 1;
+    r.cosineMass = static_cast<float>(discMass(std::span(&g, 1)).cosine);
+    components.push_back({1, g.meanX, g.meanY, g.cov.xx, g.cov.xy, g.cov.yy});
+  }
+  writeAtomically(path, encodeLobeCache(info, records, components, lookup));
+}
+
+/// The records in the table that lobedump --plot prints: a line about the plot, a header, one line for each row.
+std::vector<int> plottedRecords(const std::string& table) {
+  std::istringstream lines(table);
+  std::string line;
+  std::getline(lines, line);
+  std::getline(lines, line);
+  std::vector<int> records;
+  for (int row = 0, record = 0; std::getline(lines, line);)
+    if (std::istringstream(line) >> row >> record) records.push_back(record);
+  return records;
 }
 
 double lightness(const Colour& c) {
@@ -231,6 +268,34 @@ TEST_CASE("fitter: lobedump --plot draws fits and with --scene also targets") {
   CHECK((image.width == 752 && image.height > 256));
   CHECK(folder.run("lobedump --plot again.png --scene scene.xml other.lobe --record 7").code == 0);
   CHECK(readFile(folder / "all.png") == readFile(folder / "again.png"));
+}
+
+TEST_CASE("fitter: lobedump --plot leaves out records without a fit") {
+  const Folder folder;
+  const auto plot = [&](const std::vector<bool>& fitted, const std::string& options) {
+    writePartlyFitted(folder / "x.lobe", fitted);
+    return runBinary(folder.path(), "lobedump --plot x.png x.lobe " + options);
+  };
+  const std::vector<bool> ends{false, true, true, true, true, true, true, false};
+  ToolRun r = plot(ends, "");
+  CHECK((r.code == 0 && r.error.empty()));
+  CHECK(plottedRecords(r.out) == std::vector{1, 2, 3, 4, 6});
+  r = plot({true, false, true}, "");
+  CHECK((r.code == 0 && r.error.empty()));
+  CHECK(plottedRecords(r.out) == std::vector{0, 2});
+  r = plot(ends, "--record 6");
+  CHECK((r.code == 0 && r.error.empty()));
+  CHECK(plottedRecords(r.out) == std::vector{6});
+
+  fs::remove(folder / "x.png");
+  r = plot(ends, "--record 7");
+  CHECK(r.code == 1);
+  CHECK_THAT(r.error,
+             Catch::Contains("x.lobe (partial): record 7 is left to BSDF sampling, so there is no fit to draw"));
+  r = plot({false, false}, "");
+  CHECK(r.code == 1);
+  CHECK_THAT(r.error, Catch::Contains("x.lobe (partial): all records are left to BSDF sampling, so there is no fit"));
+  CHECK(folder.files() == 1);  // no plot was written
 }
 
 TEST_CASE("fitter: lobedump --plot reports invalid arguments") {
