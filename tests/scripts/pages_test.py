@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """Opens pages of lobedump --html in headless Chromium: a direction chosen by mouse and keyboard changes the record, the map of records turns,
-lists select records, the pages fit the width of a phone, and there is no script error.
+lists select records, the pages fit the width of a phone and work with its touch screen, and there is no script error.
 
 The argument is the folder of the tools. Exits with 77 if Chromium or Selenium is not installed.
 """
@@ -60,7 +60,7 @@ def start_browser():
 class Page:
     def __init__(self, driver, path):
         self.driver = driver
-        driver.set_window_size(1300, 1700)
+        driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
         driver.get(path.as_uri())
 
     def find(self, name):
@@ -84,9 +84,15 @@ class Page:
     def selected_row(self):
         return self.driver.execute_script("const row = document.querySelector('#list tr.selected'); return row ? Number(row.dataset.record) : null")
 
+    def shrink(self, width):
+        """Shows the page as on a phone. Windows of Chromium cannot be that narrow."""
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {"width": width, "height": 800, "deviceScaleFactor": 1, "mobile": True})
+
     def finish(self):
-        self.driver.set_window_size(500, 1700)  # the narrowest window of Chromium
-        assert self.driver.execute_script("return document.documentElement.scrollWidth <= innerWidth"), "too wide for a phone"
+        for width in (500, 360):
+            self.shrink(width)
+            needed = self.driver.execute_script("return document.documentElement.scrollWidth")
+            assert needed <= width, f"too wide for a phone of {width} pixels: {needed} pixels"
         errors = self.driver.get_log("browser")
         assert not errors, errors
 
@@ -159,9 +165,43 @@ def check_mirror(driver, folder):
     page.finish()
 
 
+def check_touch(driver, page):
+    """A finger that moves sideways turns the map until the browser scrolls the page instead; a second finger does nothing."""
+    def touch(kind, x, primary=True):
+        driver.execute_script("""
+          const [kind, x, primary] = arguments, map = document.getElementById("map");
+          map.setPointerCapture = () => {};  // which refuses fingers that do not exist
+          map.dispatchEvent(new PointerEvent(kind, {pointerId: primary ? 7 : 8, pointerType: "touch", isPrimary: primary, buttons: 1, clientX: x, clientY: 100}))
+          """, kind, x, primary)
+        return page.pixels("map")
+
+    still = touch("pointerdown", 100)
+    turned = touch("pointermove", 140)
+    assert turned != still, "a finger does not turn the map"
+    touch("pointerdown", 240, primary=False)
+    assert touch("pointermove", 200, primary=False) == turned, "a second finger turns the map"
+    touch("pointercancel", 140)
+    assert touch("pointermove", 180) == turned, "the map turns while the page is scrolled"
+
+
+def check_phone(driver, page):
+    page.shrink(360)
+    driver.execute_script("view.draw()")
+    assert page.find("map").value_of_css_property("touch-action") == "pan-y", "a drag on the map cannot scroll the page"
+    for name in ("zoom-in", "zoom-out", "reset"):
+        button = page.find(name)
+        assert min(button.size["width"], button.size["height"]) >= 40, f"{name} is too small for a finger: {button.size}"
+        before = page.pixels("map")
+        button.send_keys(Keys.ENTER)
+        assert page.pixels("map") != before, f"{name} does not change the map"
+    check_touch(driver, page)
+
+
 def check_light(driver, folder):
     page = Page(driver, folder / "light.html")
+    assert "samples per Gaussian" in page.text("map-scale") and "may be poorly fitted" in page.text("map-scale"), page.text("map-scale")
     for act in (lambda: page.find("map").send_keys(Keys.ARROW_LEFT), lambda: page.find("map").send_keys("+"),
+                lambda: page.find("zoom-in").click(), lambda: page.find("zoom-out").click(),
                 lambda: page.point("map", .2, .2).click_and_hold().move_by_offset(60, 20).release().perform(),
                 lambda: Select(page.find("colour")).select_by_visible_text("background weight"), lambda: page.find("facing").click()):
         before = page.pixels("map")
@@ -179,6 +219,7 @@ def check_light(driver, folder):
     assert page.pixels("light") != mixture, "the mixture is that of the old record"
     page.point("light", 0, 0).perform()
     assert "density" in page.output("light-probe"), page.output("light-probe")
+    check_phone(driver, page)
     page.finish()
 
 
