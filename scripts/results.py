@@ -1,11 +1,13 @@
 """What the scripts that measure and show errors have in common."""
 
 import collections
+import fcntl
 import hashlib
 import importlib.machinery
 import importlib.util
 import json
 import math
+import os
 import pathlib
 import sys
 
@@ -27,6 +29,22 @@ def write(path, text):
     temporary = path.with_name(path.name + ".tmp")
     temporary.write_text(text)
     temporary.replace(path)
+
+
+def lock(out):
+    """Ends the script if another one works in the folder. The folder is locked as long as the returned file is open."""
+    file = open(out / ".lock", "w")
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        sys.exit(f"{out}: another command is working in this folder")
+    return file
+
+
+def check_tools(parser, folder, names, option="--tools FOLDER"):
+    for tool in (folder / name for name in names):
+        if not (tool.is_file() and os.access(tool, os.X_OK)):
+            parser.error(f"{tool}: no such tool; build it, or name its folder by {option}")
 
 
 def is_biased(options):

@@ -155,14 +155,15 @@ def check_continued(folder):
     assert repeated == {missing.name}, repeated
 
 
-def interrupt(number, arguments, picture):
-    """Sends the signal as soon as the picture is written."""
+def interrupt(number, arguments, picture, meanwhile=lambda: None):
+    """Sends the signal as soon as the picture is written, and the other function has returned."""
     environment = os.environ | {"CACHE": "first", "SCENE_HASH": "0a", "RENDER_SECONDS": "60"}
     process = subprocess.Popen([str(part) for part in arguments], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     while not picture.exists():
         assert process.poll() is None, f"the run is not begun: {process.stderr.read()}"
         time.sleep(0.02)
     time.sleep(0.1)  # until its statistics are written
+    meanwhile()
     process.send_signal(number)
     _, errors = process.communicate(timeout=20)  # not those of the tools
     assert process.returncode == 128 + number, (process.returncode, errors)
@@ -175,6 +176,20 @@ def check_interrupted(folder):
         picture = out / "runs" / SCENE / "a_path-s8-1.exr"
         picture.unlink(missing_ok=True)
         interrupt(number, [ROOT / "scripts/evaluate", out, *command(folder)[1:], "--jobs", jobs], picture)
+
+
+def check_locked(folder):
+    """Two commands do not work in the same folder at the same time."""
+    out = folder / "locked"
+    arguments = [out, *command(folder)[1:]]
+
+    def refused():
+        before = contents(out)
+        assert run("evaluate", *arguments, code=1) == f"{out}: another command is working in this folder\n"
+        assert contents(out) == before
+
+    interrupt(signal.SIGTERM, [ROOT / "scripts/evaluate", *arguments], out / "runs" / SCENE / "a_path-s8-1.exr", refused)
+    run("evaluate", *arguments)
 
 
 def check_repeated(folder):
@@ -548,7 +563,7 @@ def main():
     with tempfile.TemporaryDirectory(prefix="lobe-evaluate-") as name:
         folder = pathlib.Path(name)
         make_tools(folder / "tools")
-        for check in (check_plan, check_refused, check_continued, check_interrupted, check_repeated, check_progress, check_pairs,
+        for check in (check_plan, check_refused, check_continued, check_interrupted, check_locked, check_repeated, check_progress, check_pairs,
                       check_plan_last, check_black, check_usage, check_import, check_import_only, check_markdown, check_update,
                       check_results, check_comparison, check_comparison_usage, check_charts, check_long_run, check_missing_errors,
                       check_reference, check_made_references, check_resumed_references):
