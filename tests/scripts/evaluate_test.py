@@ -278,6 +278,8 @@ def check_usage(folder):
         wrong_option("is given twice", option, *values)
     wrong_option("'path' is given twice", "--method", "path=--integrator bdpt")
     wrong_option("--build: 'a' is given twice", "--build", "a=elsewhere")
+    wrong_option("the name of a build has no '+', not 'a+path'", "--build", f"a+path={folder / 'tools'}")
+    wrong_option("a:b_path and a_b:path would write the same files", "--method", "b_path=--integrator path", "--build", f"a_b={folder / 'tools'}")
     wrong_option("is not SCENE=WIDTHxHEIGHT", "--size", "nowhere=10x10")
     wrong_option("is not SCENE=WIDTHxHEIGHT", "--size", f"{SCENE}=10")
     wrong_option("nowhere/loberender: no such tool", "--build", "b=nowhere")
