@@ -1,10 +1,10 @@
 #!/usr/bin/python3
 """Renders a small picture with scripts/farm on a Slurm cluster of its own, kills one part, puts another back into the queue, and compares the
-merged picture with that of one machine.
+merged picture with that of one machine. Before, interrupts the submission of jobs to commands that only pretend to be Slurm's.
 
 The argument is the folder of the tools. The cluster is this machine: munged, slurmctld and slurmd run as the current user, with all files in
 a temporary folder and bound to the loopback interface. Exits with 77 if Slurm or MUNGE is not installed (scripts/setup --dev installs
-them).
+them), after the checks that need neither.
 """
 
 import contextlib
@@ -257,7 +257,62 @@ def check_failure(tools, folder, cluster):
     assert not cluster.run("squeue", "--noheader"), "jobs are left in the queue"
 
 
+# Numbers its calls. The call FAILING runs FAILURE.
+SBATCH = """#!/bin/bash
+echo >>calls
+number=$(wc -l <calls)
+[ $number != "$FAILING" ] || eval "$FAILURE"
+echo $number
+"""
+
+
+def pretended_farm(folder, *arguments, failing=0, failure="", code=0):
+    """Runs scripts/farm with commands that only pretend to be Slurm's. Returns what it prints on stderr."""
+    done = subprocess.run(texts(ROOT / "scripts/farm", ROOT / "scenes/jewelry.xml", "--spp", 4, "--parts", 2, "--tools", folder, *arguments), cwd=folder,
+                          env=os.environ | {"PATH": f"{folder}:{os.environ['PATH']}", "FAILING": str(failing), "FAILURE": failure},
+                          capture_output=True, text=True)
+    assert done.returncode == code and "Traceback" not in done.stderr, (done.returncode, done.stderr)
+    return done.stderr
+
+
+def make_pretended_slurm(folder):
+    folder.mkdir()
+    for name, text in (("sbatch", SBATCH), ("scancel", '#!/bin/bash\necho "$*" >>cancelled\n'), ("squeue", "#!/bin/bash\n"), ("loberender", "")):
+        (folder / name).write_text(text)
+        (folder / name).chmod(0o755)
+
+
+def check_submission(folder):
+    """If not all jobs are submitted, those that are in the queue are cancelled, and the same command submits all of them."""
+    make_pretended_slurm(folder)
+    arguments = ("-o", "frame-{frame}.exr", "--frames", "0-9")
+    cancelled, jobs = folder / "cancelled", folder / "frame.farm/jobs.json"
+    # A fit, and three jobs for each frame. The signal arrives before sbatch prints the number of the job.
+    for failure, code, numbers in (("kill -INT $PPID", 130, "1 2 3 4 5"), ("kill -TERM $PPID", 143, "1 2 3 4 5"), ("echo full >&2; exit 1", 1, "1 2 3 4")):
+        errors = pretended_farm(folder, *arguments, failing=5, failure=failure, code=code)
+        assert cancelled.read_text() == f"{numbers}\n" and not jobs.exists() and "cancelled: jobs 1 to " in errors, errors
+        assert ("sbatch: full" in errors) == (code == 1), errors
+        cancelled.unlink()
+        (folder / "calls").unlink()
+    pretended_farm(folder, *arguments)
+    assert json.loads(jobs.read_text()) == [str(number) for number in range(1, 32)] and not cancelled.exists()
+
+
+def check_folder(folder):
+    """A number of the frame in the name of a folder does not become part of the name of the farm's folder."""
+    make_pretended_slurm(folder)
+    for name in ("d-1", "d-2", "1", "2"):
+        (folder / name).mkdir()
+    pretended_farm(folder, "-o", "d-{frame}/a.exr", "--frames", "1-2")
+    pretended_farm(folder, "-o", "{frame}/{frame}.exr", "--frames", "1-2")
+    assert not [path for path in folder.rglob("*") if "{" in path.name]
+    assert (folder / "d/a.farm/plan.json").exists() and (folder / "frames/frames.farm/plan.json").exists()
+
+
 def main():
+    with tempfile.TemporaryDirectory(prefix="lobe-farm-") as name:
+        check_submission(pathlib.Path(name) / "submission")
+        check_folder(pathlib.Path(name) / "folder")
     os.environ["PATH"] += ":/usr/sbin:/sbin"
     missing = [program for program in PROGRAMS if not shutil.which(program)]
     if missing:
