@@ -28,6 +28,7 @@ LONG = "method-whose-name-is-wider-than-its-crop-and-has-a-wordwithouthyphens"
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(ROOT / "scripts"))
+import pretended_tools  # noqa: E402
 import results  # noqa: E402
 
 try:
@@ -36,21 +37,6 @@ try:
 except ImportError:
     print("skipped: Matplotlib is not installed (python3-matplotlib)")
     sys.exit(SKIPPED)
-
-TOOL = f"""#!{sys.executable}
-import sys
-sys.path.insert(0, {str(pathlib.Path(__file__).resolve().parent)!r})
-sys.dont_write_bytecode = True
-import pretended_tools
-pretended_tools.NAME(sys.argv[1:])
-"""
-
-
-def make_tools(folder):
-    folder.mkdir()
-    for name in ("loberender", "lobefit", "lobecompare"):
-        (folder / name).write_text(TOOL.replace("NAME", name))
-        (folder / name).chmod(0o755)
 
 
 def run(script, *arguments, code=0, cwd=None, **environment):
@@ -564,7 +550,7 @@ def check_resumed_references(folder):
 def main():
     with tempfile.TemporaryDirectory(prefix="lobe-evaluate-") as name:
         folder = pathlib.Path(name)
-        make_tools(folder / "tools")
+        pretended_tools.make(folder / "tools")
         for check in (check_plan, check_refused, check_continued, check_interrupted, check_locked, check_repeated, check_progress, check_pairs,
                       check_plan_last, check_black, check_usage, check_import, check_import_only, check_markdown, check_update,
                       check_results, check_comparison, check_comparison_usage, check_charts, check_long_run, check_missing_errors,

@@ -1,4 +1,4 @@
-"""Tools that only pretend to fit, render and compare, for evaluate_test.py. CACHE is the content of every cache, SCENE_HASH the hash of every
+"""Tools that only pretend to fit, render and compare, for tests of scripts. CACHE is the content of every cache, SCENE_HASH the hash of every
 scene, RENDER_SECONDS how long a picture takes. RANGE is how much the relative variance of a pair grows with the sum of its seeds. FIRST_RELMSE
 is the error of the first snapshots. The pictures of a peer are darker, and those of the method black are black. Caches that are broken
 cannot be fitted."""
@@ -10,6 +10,22 @@ import struct
 import sys
 import time
 import zlib
+
+TOOL = f"""#!{sys.executable}
+import sys
+sys.path.insert(0, {str(pathlib.Path(__file__).resolve().parent)!r})
+sys.dont_write_bytecode = True
+import pretended_tools
+pretended_tools.NAME(sys.argv[1:])
+"""
+
+
+def make(folder, names=("loberender", "lobefit", "lobecompare")):
+    """Writes the tools into a new folder."""
+    folder.mkdir(parents=True)
+    for name in names:
+        (folder / name).write_text(TOOL.replace("NAME", name.replace("-", "_")))
+        (folder / name).chmod(0o755)
 
 
 def loberender(arguments):

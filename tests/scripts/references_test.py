@@ -1,25 +1,32 @@
 #!/usr/bin/python3
 """Makes references of a small scene: methods that agree give one reference with its variance, an interrupted run is resumed, and methods
-that disagree are reported and both kept.
+that disagree are reported and both kept. Before, tools that only pretend to render show what is refused, repeated and ended.
 
 The argument is the folder of the tools.
 """
 
+import contextlib
 import json
+import os
 import pathlib
+import runpy
 import signal
 import subprocess
 import sys
 import tempfile
 import time
 
+sys.dont_write_bytecode = True
+import pretended_tools  # noqa: E402
+
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(ROOT / "scripts"))
 SCENE = ROOT / "tests/data/room.xml"
 QUICK = "--passes 1 --photons 2000 --importons 1000 --russian-roulette throughput --light-paths off"
 
 
 def start(tools, out, *options):
-    command = [ROOT / "scripts/make-references", out, SCENE, "--tools", tools, "--runs", "4", *options]
+    command = [ROOT / "scripts/make-references", out, SCENE, *options, "--tools", tools, "--runs", "4"]
     return subprocess.Popen([str(part) for part in command], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
@@ -83,9 +90,120 @@ def check_resumed(tools, out):
     assert len(complete_runs(out)) == 8 and not checkpoint.exists()
 
 
+@contextlib.contextmanager
+def rendering(tools, out, *options, picture):
+    """Pretended tools that have written the picture, and are ended with the context before the run is complete."""
+    os.environ["RENDER_SECONDS"] = "60"
+    process = start(tools, out, *options)
+    del os.environ["RENDER_SECONDS"]
+    try:
+        while not picture.exists():
+            assert process.poll() is None, process.communicate()
+            time.sleep(0.02)
+        time.sleep(0.1)  # until its statistics are written
+        yield
+    finally:
+        process.terminate()
+        process.communicate()
+
+
+def check_names(tools, out):
+    """What would write to the same files is refused before anything is rendered, as are other wrong options."""
+    other = out.with_name("other") / "room.xml"
+    other.parent.mkdir()
+    other.write_bytes(SCENE.read_bytes())
+    (other.parent / "room-variance.xml").write_bytes(SCENE.read_bytes())
+    file = out.with_name("file")
+    file.touch()
+
+    def refused(text, *options, out=out, tools=tools):
+        _, errors = run(tools, out, *options, code=2)
+        assert text in errors and "Traceback" not in errors and not (out / "room").exists(), errors
+
+    for method, text in (("path-variance=--integrator path", "is the name of other files"), ("caches=--integrator path", "is the name of other files"),
+                         ("..=--integrator path", "is the name of other files"), ("=--integrator path", "is not NAME="),
+                         ("a/b=--integrator path", "a name has no"), ("a=--integrator 'path", "No closing quotation"), ("other", "unknown method 'other'")):
+        refused(text, "--methods", "path", method)
+    refused("files of the same names would be written for", other)
+    refused("files of the same names would be written for", other.parent / "room-variance.xml")
+    refused("no such scene file", "kitchen")
+    refused("is not a positive integer", "--threads", "0")
+    refused("no such tool", tools=out)
+    refused("is not a folder", out=file)
+
+
+def check_gradients(tools, out):
+    run(tools, out, "--spp", "1", "--methods", "path", "gradients=--integrator path --gradients=l2")
+    assert "--checkpoint" not in (out / "room/gradients/2.exr").read_text() and "--checkpoint" in (out / "room/path/1.exr").read_text()
+
+
+def check_deleted(tools, out):
+    """A run of which a file was deleted is repeated, and not complete before its end."""
+    options = ("--spp", "1", "--methods", "path", "guided")
+    run(tools, out, *options)
+    before = complete_runs(out)
+    deleted = {out / "room/path/1.exr", out / "room/guided/4.json"}
+    for file in deleted:
+        file.unlink()
+    run(tools, out, *options)
+    after = complete_runs(out)
+    assert {run for run in before if before[run] != after[run]} == {file.with_suffix(".run") for file in deleted}
+    assert all(file.exists() for file in deleted)
+    picture = out / "room/path/1.exr"
+    picture.unlink()
+    with rendering(tools, out, *options, picture=picture):
+        pass
+    assert picture.exists() and not picture.with_suffix(".run").exists()
+
+
+def check_replaced(_, out):
+    """Runs during which the tools were replaced are not taken for runs of the former ones."""
+    tools = out.with_name("replaced")
+    pretended_tools.make(tools)
+    former = (tools / "loberender").read_text()
+    (tools / "loberender").write_text(former + "if '-o' in sys.argv:\n    open(__file__, 'a').write('# new')\n")
+    _, errors = run(tools, out, "--spp", "1", "--methods", "path", "guided", code=1)
+    assert f"loberender in {tools} changed meanwhile" in errors and not complete_runs(out) and not list(out.rglob("*.begun")), errors
+
+
+def check_locked(tools, out):
+    options = ("--spp", "1", "--methods", "path", "guided")
+    with rendering(tools, out, *options, picture=out / "room/path/1.exr"):
+        _, errors = run(tools, out, *options, code=1)
+        assert "another command is working in this folder" in errors, errors
+
+
+def check_copied(_, out):
+    """Where there are no hard links, the reference is a copy."""
+    out.mkdir()
+    script = runpy.run_path(str(ROOT / "scripts/make-references"))
+
+    def refuse(*_):
+        raise PermissionError
+
+    before, pathlib.Path.hardlink_to = pathlib.Path.hardlink_to, refuse
+    try:
+        for content in ("first", "second"):
+            (out / "source").write_text(content)
+            script["link"](out / "source", out / "target")
+            assert (out / "target").read_text() == content
+    finally:
+        pathlib.Path.hardlink_to = before
+
+
+def check_pretended(folder):
+    tools = folder / "tools"
+    pretended_tools.make(tools)
+    os.environ |= {"CACHE": "first", "SCENE_HASH": "0a", "LOBE_DATA": str(folder)}
+    for check in (check_names, check_gradients, check_deleted, check_replaced, check_locked, check_copied):
+        check(tools, folder / check.__name__)
+        print(check.__name__, "passed", flush=True)
+
+
 def main():
     tools = pathlib.Path(sys.argv[1]).resolve()
     with tempfile.TemporaryDirectory(prefix="lobe-references-") as name:
+        check_pretended(pathlib.Path(name) / "pretended")
         for check in (check_agreement, check_disagreement, check_resumed):
             check(tools, pathlib.Path(name) / check.__name__)
             print(check.__name__, "passed", flush=True)
