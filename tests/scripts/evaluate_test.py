@@ -447,7 +447,7 @@ def errors_of_long_run(folder, *more, **environment):
 
 def check_long_run(folder):
     shown, errors = errors_of_long_run(folder)
-    assert "bdpt-gradients: slope 0.000, of the trimmed variance 0.000" in shown and "no error" not in shown, shown
+    assert "bdpt-gradients: slope over the samples 0.000, of the trimmed variance 0.000" in shown and "no error" not in shown, shown
     assert (folder / "long/bdpt-gradients-1.exr").read_text().count("--integrator bdpt --gradients l2"), "not the options of the method"
     # Half of the relMSE of both last pictures.
     assert set(map(float, errors)) == {0.01}, errors
@@ -459,13 +459,63 @@ def check_missing_errors(folder):
     """The difference of the first snapshots from the other run is less than the error of its last picture."""
     shown, errors = errors_of_long_run(folder, FIRST_RELMSE="0.005")
     assert errors[0] == "nan" and set(map(float, errors[1:])) == {0.01}, errors
-    assert f"1 of {len(errors)} snapshots have no error" in shown and "slope 0.000" in shown, shown
+    assert f"1 of {len(errors)} snapshots have no error" in shown and "samples 0.000" in shown, shown
     run("draw-long-run", folder / "long", "-o", folder / "long.svg")
     assert ": 0.00 (0.00)" in (folder / "long.svg").read_text()
     # Without two different numbers of samples, there is no slope.
     (folder / "long/bdpt-gradients.csv").write_text("seconds,spp,error,trimmed,resident_bytes\n1,1,nan,0.1,\n2,2,0.2,0.1,\n")
     run("draw-long-run", folder / "long", "-o", folder / "long.svg")
     assert ": nan (0.00)" in (folder / "long.svg").read_text()
+
+
+SLEEPING = f"""#!{sys.executable}
+import sys
+import time
+if sys.argv[sys.argv.index("--seed") + 1] == FAILING:
+    sys.exit(3)
+print("begun", file=sys.stderr, flush=True)
+time.sleep(60)
+"""
+
+
+def check_ended_long_run(folder):
+    """If one of the runs fails, or the script is interrupted, both are ended."""
+    tools, out = folder / "sleeping", folder / "ended"
+    pretended_tools.make(tools)
+    command = [str(part) for part in (ROOT / "scripts/bench-long-run", out, ROOT / "scenes/livingroom.xml", "60", "--tools", tools)]
+
+    def start(failing):
+        (tools / "loberender").write_text(SLEEPING.replace("FAILING", repr(failing)))
+        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    def ended(process, code, text):
+        shown, errors = process.communicate(timeout=20)
+        assert process.returncode == code and text in errors and "Traceback" not in errors and not shown, (process.returncode, errors)
+        commands = [path.read_bytes() for path in pathlib.Path("/proc").glob("[0-9]*/cmdline") if os.access(path, os.R_OK)]
+        assert not any(str(tools / "loberender").encode() in words for words in commands), "loberender goes on"
+
+    ended(start("1"), 1, "loberender failed with code 3")
+    seeds = (1, 2) if len(os.sched_getaffinity(0)) > 1 else (1,)
+    for number in (signal.SIGTERM, signal.SIGINT):
+        for log in out.glob("*.log"):
+            log.unlink()
+        process = start(None)
+        while not all((log := out / f"product-{seed}.log").exists() and log.read_text() for seed in seeds):
+            assert process.poll() is None, process.communicate()
+            time.sleep(0.02)
+        process.send_signal(number)
+        ended(process, 128 + number, "interrupted")
+    assert not list(out.glob("*.csv*"))
+    (tools / "lobecompare").unlink()
+    ended(start(None), 2, "no such tool")
+
+
+def check_memory(_):
+    """That of the run that uses more."""
+    script = runpy.run_path(str(ROOT / "scripts/bench-long-run"))
+    script["pair"].__globals__["compare"] = lambda *_: {"relvar_drop_1pct": 0.1}
+    a, b, c = ({"picture": "", "seconds": 1, "spp": 1, "error": 0.1, "resident_bytes": memory} for memory in (5, 7, None))
+    assert [script["pair"](None, *rows)["resident_bytes"] for rows in ((a, b), (b, a), (c, a), (c, c))] == [7, 7, 5, None]
 
 
 def check_reference(folder):
@@ -553,7 +603,7 @@ def main():
         pretended_tools.make(folder / "tools")
         for check in (check_plan, check_refused, check_continued, check_interrupted, check_locked, check_repeated, check_progress, check_pairs,
                       check_plan_last, check_black, check_usage, check_import, check_import_only, check_markdown, check_update,
-                      check_results, check_comparison, check_comparison_usage, check_charts, check_long_run, check_missing_errors,
+                      check_results, check_comparison, check_comparison_usage, check_charts, check_long_run, check_missing_errors, check_ended_long_run, check_memory,
                       check_reference, check_made_references, check_resumed_references):
             check(folder)
             print(check.__name__, "passed", flush=True)
