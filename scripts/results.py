@@ -24,6 +24,11 @@ def sha256(path):
     return hashlib.sha256(pathlib.Path(path).read_bytes()).hexdigest()
 
 
+def sha256_of(names):
+    """That of a dictionary, whatever its order."""
+    return hashlib.sha256(json.dumps(names, sort_keys=True).encode()).hexdigest()
+
+
 def write(path, text):
     """Replaces the file at once, so that an interruption leaves the old or the new content."""
     temporary = path.with_name(path.name + ".tmp")

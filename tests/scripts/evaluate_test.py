@@ -178,6 +178,17 @@ def check_locked(folder):
     run("evaluate", *arguments)
 
 
+def check_replaced(folder):
+    """Nothing is recorded for tools that have replaced those of the start."""
+    tools = folder / "replaced"
+    pretended_tools.make(tools)
+    for tool in ("lobefit", "loberender", "lobecompare"):
+        out = folder / f"of-replaced-{tool}"
+        errors = run("evaluate", out, *command(folder)[1:-1], f"a={tools}", code=1, REPLACED=tool)
+        assert errors.splitlines()[-1].startswith(f"{tools / tool} was replaced during the evaluation") and "Traceback" not in errors, errors
+        assert bool(list(out.rglob("*.run"))) == (tool == "lobecompare") and not (out / "errors.csv").exists(), "something is recorded"
+
+
 def check_repeated(folder):
     """A run that is repeated is not complete before its end, although it was."""
     picture = folder / "out/runs" / SCENE / "a_path-s8-2.exr"
@@ -601,10 +612,11 @@ def main():
     with tempfile.TemporaryDirectory(prefix="lobe-evaluate-") as name:
         folder = pathlib.Path(name)
         pretended_tools.make(folder / "tools")
-        for check in (check_plan, check_refused, check_continued, check_interrupted, check_locked, check_repeated, check_progress, check_pairs,
-                      check_plan_last, check_black, check_usage, check_import, check_import_only, check_markdown, check_update,
-                      check_results, check_comparison, check_comparison_usage, check_charts, check_long_run, check_missing_errors, check_ended_long_run, check_memory,
-                      check_reference, check_made_references, check_resumed_references):
+        for check in (check_plan, check_refused, check_continued, check_interrupted, check_locked, check_replaced, check_repeated,
+                      check_progress, check_pairs, check_plan_last, check_black, check_usage, check_import, check_import_only,
+                      check_markdown, check_update, check_results, check_comparison, check_comparison_usage, check_charts, check_long_run,
+                      check_missing_errors, check_ended_long_run, check_memory, check_reference, check_made_references,
+                      check_resumed_references):
             check(folder)
             print(check.__name__, "passed", flush=True)
     return 0
