@@ -256,6 +256,15 @@ def check_black(folder):
     assert {one["method"]: one["relative_mean"] for one in results.read_summary(out)} == {"a:black": 0, "a:other": 2}
 
 
+def check_missing_statistic(folder):
+    """Older tools do not have all statistics."""
+    out = folder / "older"
+    run("evaluate", out, *command(folder)[1:], MISSING="rays")
+    assert {row["rays"] for row in rows_of(out / "runs.csv")} == {""}
+    assert all("rays" not in one and one["spp"] == 1 for one in results.read_summary(out))
+    assert "|  |" in run("report", out, "--markdown").splitlines()[-1]
+
+
 def check_usage(folder):
     def wrong(text, *arguments, **environment):
         errors = run("evaluate", *arguments, code=2, **environment)
@@ -613,10 +622,10 @@ def main():
         folder = pathlib.Path(name)
         pretended_tools.make(folder / "tools")
         for check in (check_plan, check_refused, check_continued, check_interrupted, check_locked, check_replaced, check_repeated,
-                      check_progress, check_pairs, check_plan_last, check_black, check_usage, check_import, check_import_only,
-                      check_markdown, check_update, check_results, check_comparison, check_comparison_usage, check_charts, check_long_run,
-                      check_missing_errors, check_ended_long_run, check_memory, check_reference, check_made_references,
-                      check_resumed_references):
+                      check_progress, check_pairs, check_plan_last, check_black, check_missing_statistic, check_usage, check_import,
+                      check_import_only, check_markdown, check_update, check_results, check_comparison, check_comparison_usage,
+                      check_charts, check_long_run, check_missing_errors, check_ended_long_run, check_memory, check_reference,
+                      check_made_references, check_resumed_references):
             check(folder)
             print(check.__name__, "passed", flush=True)
     return 0

@@ -1,7 +1,7 @@
 """Tools that only pretend to fit, render and compare, for tests of scripts. CACHE is the content of every cache, SCENE_HASH the hash of every
 scene, RENDER_SECONDS how long a picture takes. RANGE is how much the relative variance of a pair grows with the sum of its seeds. FIRST_RELMSE
-is the error of the first snapshots. The tool called REPLACED is another one after each of its calls. The pictures of a peer are darker, and
-those of the method black are black. Caches that are broken cannot be fitted."""
+is the error of the first snapshots. The tool called REPLACED is another one after each of its calls. The statistics lack the one called
+MISSING. The pictures of a peer are darker, and those of the method black are black. Caches that are broken cannot be fitted."""
 
 import json
 import os
@@ -53,6 +53,7 @@ def write_outputs(arguments, samples):
             numbers = ("seconds_total", "seconds_training", "seconds_rendering", "spp", "rays", "path_segments", "segments_per_second",
                        "mean_path_length", "records", "training_particles", "peak_rss_bytes")
             stats = {"integrator": "path", "scene_hash": os.environ["SCENE_HASH"]} | {key: samples for key in numbers}
+            stats.pop(os.environ.get("MISSING"), None)
             # At once, because scripts/bench-long-run reads it meanwhile.
             pathlib.Path(f"{value}.tmp").write_text(json.dumps(stats))
             pathlib.Path(f"{value}.tmp").replace(value)
