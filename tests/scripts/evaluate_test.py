@@ -265,6 +265,14 @@ def check_missing_statistic(folder):
     assert "|  |" in run("report", out, "--markdown").splitlines()[-1]
 
 
+def check_command(folder):
+    """The recorded command has OUT in place of the folder, but not of words that are equal to its name."""
+    out = folder / "path"
+    arguments = ["--scenes", SCENE, "--methods", "path", "--seconds", "8", "--build", f"a={folder / 'tools'}"]
+    run("evaluate", *arguments, "path", cwd=folder)
+    assert json.loads((out / "plan.json").read_text())["command"] == ["scripts/evaluate", *arguments, "OUT"]
+
+
 def check_usage(folder):
     def wrong(text, *arguments, **environment):
         errors = run("evaluate", *arguments, code=2, **environment)
@@ -622,7 +630,7 @@ def main():
         folder = pathlib.Path(name)
         pretended_tools.make(folder / "tools")
         for check in (check_plan, check_refused, check_continued, check_interrupted, check_locked, check_replaced, check_repeated,
-                      check_progress, check_pairs, check_plan_last, check_black, check_missing_statistic, check_usage, check_import,
+                      check_progress, check_pairs, check_plan_last, check_black, check_missing_statistic, check_command, check_usage, check_import,
                       check_import_only, check_markdown, check_update, check_results, check_comparison, check_comparison_usage,
                       check_charts, check_long_run, check_missing_errors, check_ended_long_run, check_memory, check_reference,
                       check_made_references, check_resumed_references):
