@@ -58,12 +58,18 @@ def is_biased(options):
     return any(biased in text for biased in ("--integrator vcm", "--gradients l1", "--firefly-limit"))
 
 
-def read_summary(out):
-    """The content of summary.json in a folder of scripts/evaluate."""
+def read_output(out, name):
+    """The text of a file in a folder of scripts/evaluate."""
     try:
-        return json.loads((out / "summary.json").read_text())
+        return (out / name).read_text()
     except FileNotFoundError as e:
         sys.exit(f"{e.filename}: not found; run scripts/evaluate {out} first")
+    except NotADirectoryError:
+        sys.exit(f"{out} is not a folder of scripts/evaluate")
+
+
+def read_summary(out):
+    return json.loads(read_output(out, "summary.json"))
 
 
 def rank(budget):

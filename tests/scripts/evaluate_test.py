@@ -372,6 +372,39 @@ def check_markdown(folder):
     assert parts[4].splitlines()[-1].endswith(" | 0.757 |"), parts[4]
 
 
+def check_report_usage(folder):
+    out = folder / "out"
+
+    def wrong(text, *arguments, code=2):
+        errors = run("report", *arguments, code=code)
+        assert text in errors and "Traceback" not in errors, errors
+        assert not (out / "report.html").exists() and not (folder / "no").exists()
+
+    wrong("nowhere/lobecompare: no such tool; build it, or name its folder by --tools FOLDER", out, "--tools", folder / "nowhere")
+    for option in ("-o", "--save"):
+        wrong("no/file: its folder does not exist", out, option, folder / "no/file")
+        wrong("tools is a folder", out, option, folder / "tools")
+    wrong("plan.json is not a folder of scripts/evaluate", out / "plan.json", code=1)
+    wrong("no/summary.json: not found; run scripts/evaluate", folder / "no", code=1)
+    for others in (("--markdown", "-o", "page.html"), ("--save", "saved.json", "--markdown"), ("--save", "saved.json", "-o", "page.html")):
+        wrong("not allowed with argument", out, *others)
+    plan = out / "plan.json"
+    plan.rename(folder / "away.json")
+    wrong("plan.json: not found; run scripts/evaluate", out, code=1)
+    (folder / "away.json").rename(plan)
+
+
+def check_page(folder):
+    """Names of methods cannot end the script of the page, or change how a browser reads it."""
+    out = folder / "page"
+    run("evaluate", out, "--scenes", SCENE, "--methods", "--method", "<!--<script>=--integrator path", "--build", f"a={folder / 'tools'}")
+    run("report", out, "--tools", folder / "tools")
+    page = (out / "report.html").read_text()
+    data = page.partition("const data = ")[2].partition("\n")[0]
+    assert "<" not in data and json.loads(data.rstrip(";"))["summary"][0]["method"] == "a:<!--<script>", data
+    assert not list(out.glob("*.tmp"))
+
+
 def check_update(folder):
     """Tables of a Markdown file are made again from saved evaluations, and what stands around them stays."""
     text = folder / "text.md"
@@ -630,10 +663,10 @@ def main():
         folder = pathlib.Path(name)
         pretended_tools.make(folder / "tools")
         for check in (check_plan, check_refused, check_continued, check_interrupted, check_locked, check_replaced, check_repeated,
-                      check_progress, check_pairs, check_plan_last, check_black, check_missing_statistic, check_command, check_usage, check_import,
-                      check_import_only, check_markdown, check_update, check_results, check_comparison, check_comparison_usage,
-                      check_charts, check_long_run, check_missing_errors, check_ended_long_run, check_memory, check_reference,
-                      check_made_references, check_resumed_references):
+                      check_progress, check_pairs, check_plan_last, check_black, check_missing_statistic, check_command, check_usage,
+                      check_import, check_import_only, check_markdown, check_report_usage, check_page, check_update, check_results,
+                      check_comparison, check_comparison_usage, check_charts, check_long_run, check_missing_errors, check_ended_long_run,
+                      check_memory, check_reference, check_made_references, check_resumed_references):
             check(folder)
             print(check.__name__, "passed", flush=True)
     return 0
