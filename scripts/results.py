@@ -131,9 +131,12 @@ def variance(one):
 
 
 def print_table(header, rows):
-    print("| " + " | ".join(header) + " |\n" + "|---" * len(header) + "|")
+    def line(cells):
+        return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+    print(line(header) + "\n" + "|---" * len(header) + "|")
     for row in rows:
-        print("| " + " | ".join(row) + " |")
+        print(line(row))
 
 
 def print_methods(rows, methods, label, text):

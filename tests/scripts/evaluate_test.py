@@ -395,13 +395,14 @@ def check_report_usage(folder):
 
 
 def check_page(folder):
-    """Names of methods cannot end the script of the page, or change how a browser reads it."""
+    """Names of methods cannot end the script of the page, change how a browser reads it, or split cells of the tables in Markdown."""
     out = folder / "page"
-    run("evaluate", out, "--scenes", SCENE, "--methods", "--method", "<!--<script>=--integrator path", "--build", f"a={folder / 'tools'}")
+    run("evaluate", out, "--scenes", SCENE, "--methods", "--method", "<!--<script>|=--integrator path", "--build", f"a={folder / 'tools'}")
     run("report", out, "--tools", folder / "tools")
     page = (out / "report.html").read_text()
     data = page.partition("const data = ")[2].partition("\n")[0]
-    assert "<" not in data and json.loads(data.rstrip(";"))["summary"][0]["method"] == "a:<!--<script>", data
+    assert run("report", out, "--markdown").count("| a:<!--<script>\\| |") == 3, "names of methods split cells"
+    assert "<" not in data and json.loads(data.rstrip(";"))["summary"][0]["method"] == "a:<!--<script>|", data
     assert not list(out.glob("*.tmp"))
 
 
