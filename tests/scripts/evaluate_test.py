@@ -415,11 +415,21 @@ def check_update(folder):
     updated = text.read_text()
     assert updated.startswith("Before.\n\n<!-- evaluation: saved.json -->\n\n|  | a:path |"), updated
     assert updated.endswith("\n\n<!-- end of evaluation -->\n\nAfter.\n") and "old" not in updated, updated
+    assert "\n\n" + run("report", folder / "out", "--markdown").splitlines()[0] + "\n" in updated, updated
     assert f"\n    scripts/evaluate OUT --scenes {SCENE} " in updated, updated
     assert "" == run("report", "--update", text) and text.read_text() == updated, text.read_text()
     for wrong in ("", "<!-- evaluation: saved.json -->\n<!-- end of evaluations -->\n" + updated, updated.replace("evaluation:", "evaluate:")):
         text.write_text(wrong)
         assert "text.md: must have lines" in run("report", "--update", text, code=1) and text.read_text() == wrong, wrong
+    saved = json.loads((folder / "saved.json").read_text())
+    for name in ("second", "third"):
+        plan = saved["plan"] | ({"jobs": 2} if name == "third" else {})
+        (folder / f"{name}.json").write_text(json.dumps({"plan": plan, "summary": [one | {"scene": name} for one in saved["summary"]]}))
+    text.write_text("<!-- evaluation: saved.json second.json third.json -->\n<!-- end of evaluation -->\n")
+    run("report", "--update", text)
+    machine = f"{saved['plan']['machine']['cpu']}, {saved['plan']['machine']['cores']} core"
+    lines = [line.partition(machine)[0] for line in text.read_text().splitlines() if machine in line]
+    assert lines == [f"{SCENE}, second: ", "third: "], lines
     text.write_text("<!-- evaluation: saved.json saved.json -->\n<!-- end of evaluation -->\n")
     assert f"saved.json: {SCENE}, " in run("report", "--update", text, code=1)
     text.write_text("<!-- evaluation: missing.json -->\n<!-- end of evaluation -->\n")
