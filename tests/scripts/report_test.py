@@ -73,7 +73,7 @@ def check_markdown(out):
     assert errors[0] == f"|  | a:path | a:depth-2.0 | {PEER} |" and len(errors) == 2 + 4, errors
     for line in errors[2:]:
         assert line.count("**") in (2, 4) and "**" not in line.split("|")[-2], f"no method is the best: {line}"
-    columns = "samples per pixel | rays, millions | mean path length | training, s | memory, MB | mean / mean of all methods"
+    columns = "samples per pixel | rays, millions | segments per sample | training, s | memory, MB | mean / mean of all methods"
     assert costs[0] == f"| scene, budget | method | {columns} |", costs
     for line in costs[2:]:
         assert 0 < float(line.split("|")[-2]) < 9, f"not a mean relative to that of nine groups: {line}"
