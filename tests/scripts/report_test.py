@@ -110,16 +110,16 @@ def check_best(driver):
       data.summary = [["a", 1, .2], ["b", 1.4, .3], ["c", 1.6, .3], ["d", .9, null]].map(([method, trimmed, trimmed_spread]) =>
         ({scene: "s", budget: method === "d" ? "imported" : "spp 1", method, trimmed, trimmed_spread, all: trimmed}));
       methods.splice(0, Infinity, "a", "b", "c", "d");""")
-    best = driver.execute_script("return [...overview().querySelectorAll('.best')].map(cell => cell.textContent)")
+    best = driver.execute_script("return [...overview().querySelectorAll('td > strong')].map(cell => cell.textContent)")
     assert best == ["1 ± 0.2 (1)", "1.4 ± 0.3 (1.4)"], best
     driver.execute_script("data.summary = data.summary.slice(3);")
-    assert driver.execute_script("return overview().querySelector('tbody').textContent") == "s imported0.9 (0.9)", "no table of imported pictures"
+    assert driver.execute_script("return overview().querySelector('tbody').textContent") == "s, imported0.9 (0.9)", "no table of imported pictures"
     driver.refresh()
 
 
 def check_pointer(driver, scene):
     """Dragging in the picture moves the edge only, a click the crop only."""
-    slider, right, window = (scene.find_element(By.CSS_SELECTOR, name) for name in (".slider", "img.right", ".window"))
+    slider, right, window = (scene.find_element(By.CSS_SELECTOR, name) for name in (".slider", "img.right", ".frame"))
     bar = scene.find_element(By.CSS_SELECTOR, "input[type=range]")
 
     def state():
@@ -142,6 +142,16 @@ def check_runs(scene):
         assert bool(row[time]) == bool(row[relative]) == (row[0] != PEER), row
         assert row[0] != "a:path" or row[relative] == "1", row
     assert len(rows) == 9, rows
+
+
+def check_accessible(driver):
+    """Areas that scroll can be reached and have names, and so do rows of tables."""
+    unnamed = driver.execute_script("""
+      return [...document.querySelectorAll(".scroll, [aria-label]")].filter(one => !(one.matches("[role], nav, input, select") &&
+        one.ariaLabel && (one.tabIndex === 0 || !one.matches(".scroll")))).map(one => one.outerHTML.slice(0, 200))""")
+    assert not unnamed, unnamed
+    assert driver.execute_script("return [...document.querySelectorAll('tbody tr')].every(row => row.matches(':has(> th[scope=row]:first-child)'))")
+    assert driver.execute_script("return document.querySelectorAll('main section').length === document.querySelectorAll('section').length")
 
 
 def check_charts(driver):
@@ -168,7 +178,7 @@ def check_phone(driver):
     drawn, natural = driver.execute_script("const image = document.querySelector('#charts img'); return [image.width, image.naturalWidth]")
     assert drawn >= 0.9 * natural, "drawings are too small to read"
     left, scrolled = driver.execute_script("""
-      const place = document.getElementById("caches"), cell = place.querySelector("td");
+      const place = document.getElementById("caches"), cell = place.querySelector("tbody th");
       place.scrollLeft = 1000;
       return [cell.getBoundingClientRect().left - place.getBoundingClientRect().left, place.scrollLeft]""")
     assert scrolled > 100 and abs(left) < 1, "the first column is not visible beside the others"
@@ -183,8 +193,11 @@ def check(driver, tools):
     for _ in range(10):
         bar.send_keys(Keys.ARROW_RIGHT)
     assert "60%" in right.value_of_css_property("clip-path"), "the slider does not move"
-    window = scene.find_element(By.CSS_SELECTOR, ".window")
-    before = window.value_of_css_property("left")
+    window = scene.find_element(By.CSS_SELECTOR, ".frame")
+    before, top = window.value_of_css_property("left"), window.value_of_css_property("top")
+    for key in (Keys.ALT, Keys.CONTROL, Keys.META):
+        scene.find_element(By.CSS_SELECTOR, ".slider").send_keys(key, Keys.ARROW_DOWN, Keys.NULL)
+    assert window.value_of_css_property("top") == top, "keys of the browser move the crop"
     scene.find_element(By.CSS_SELECTOR, ".slider").send_keys(Keys.ARROW_RIGHT)
     assert window.value_of_css_property("left") != before, "the crop does not move"
     # Crops are square, and so is the frame.
@@ -192,19 +205,21 @@ def check(driver, tools):
     picture = right.get_attribute("src")
     scene.find_element(By.CSS_SELECTOR, "input[type=checkbox]").send_keys(Keys.SPACE)
     assert right.get_attribute("src") != picture, "there is no error map"
+    assert right.get_attribute("alt") == f"jewelry, error map of {PEER}", right.get_attribute("alt")
+    assert "logarithmic" in scene.find_element(By.CSS_SELECTOR, ".legend").text
     assert scene.find_element(By.CSS_SELECTOR, ".legend").is_displayed(), "error maps have no scale"
     captions = [caption.text for caption in scene.find_elements(By.CSS_SELECTOR, ".crops figcaption")]
     assert len(captions) == 3 and all("\nvariance 0." in caption for caption in captions), captions
     check_pointer(driver, scene)
     check_runs(scene)
-    assert "Pictures: a:path seconds 1," in scene.text, "pictures are not those of the longest time"
+    assert "Pictures: a:path 1 s," in scene.text, "pictures are not those of the longest time"
     check_chart(driver, scene)
     digest = hashlib.sha256((tools / "loberender").read_bytes()).hexdigest()
     shown = driver.find_element(By.ID, "machine").text
     assert "loberender " in shown and f"(hash {digest[:8]}) as a." in shown, shown
-    header = [cell.text for cell in driver.find_elements(By.CSS_SELECTOR, "#table th")]
+    header = [cell.text for cell in driver.find_elements(By.CSS_SELECTOR, "#table thead th")]
     assert header == ["", "a:path", "a:depth-2.0", PEER], header
-    peers = [row.find_elements(By.TAG_NAME, "td")[3].text for row in driver.find_elements(By.CSS_SELECTOR, "#table tbody tr")]
+    peers = [row.find_elements(By.TAG_NAME, "td")[2].text for row in driver.find_elements(By.CSS_SELECTOR, "#table tbody tr")]
     assert len(peers) == 4 and len(set(peers)) == 1 and " ± " in peers[0] and peers[0].endswith(", 1.6 s"), peers
     before = scene.find_element(By.CSS_SELECTOR, ".chart svg").get_attribute("outerHTML")
     Select(scene.find_element(By.CSS_SELECTOR, "div:has(> .chart) select")).select_by_index(2)
@@ -219,6 +234,7 @@ def check(driver, tools):
     assert "'depth-2.0=--integrator path --max-depth 2'" in command and "\n" not in command, command
     assert not driver.find_element(By.ID, "plan").is_displayed(), "the plan is not folded"
     check_charts(driver)
+    check_accessible(driver)
     check_phone(driver)
     errors = driver.get_log("browser")
     assert not errors, errors
