@@ -91,8 +91,22 @@ def open_page(page):
     return driver
 
 
+def check_values(driver, scene):
+    """A line below a chart shows the values of the point that the pointer or the keyboard has chosen."""
+    values = scene.find_element(By.CSS_SELECTOR, ".chart .values")
+    points = scene.find_elements(By.CSS_SELECTOR, ".chart .plot circle")
+    titles = [point.get_attribute("aria-label") for point in points]
+    assert titles[0].startswith("a:path, ") and len(set(titles)) == len(points), titles
+    ActionChains(driver).move_to_element(points[1]).click().perform()
+    assert values.text == titles[1] and driver.switch_to.active_element == points[1], values.text
+    points[1].send_keys(Keys.ARROW_RIGHT, Keys.ARROW_RIGHT, Keys.ARROW_LEFT)
+    assert values.text == titles[2] and driver.switch_to.active_element == points[2], values.text
+    assert [point.get_attribute("tabindex") for point in points].count("0") == 1, "not one point is in the order of the tab key"
+
+
 def check_chart(driver, scene):
     assert len(scene.find_elements(By.CSS_SELECTOR, "circle > title")) == 4 + 4 + 1, "not a point for each budget, and the peer's"
+    check_values(driver, scene)
     text = scene.find_element(By.CSS_SELECTOR, ".chart").text
     assert text.count("slope") == text.count("±") == 2, f"slopes and their intervals are not shown: {text}"
     lines = [line.get_attribute("points").split() for line in scene.find_elements(By.CSS_SELECTOR, "polyline")]
