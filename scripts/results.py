@@ -94,7 +94,7 @@ def without_imported(summary):
 
 def budget_text(budget):
     kind, _, amount = budget.partition(" ")
-    return {"seconds": f"{amount} s", "spp": f"{amount} samples"}.get(kind, kind)
+    return {"seconds": f"{amount} s", "spp": "1 sample" if amount == "1" else f"{amount} samples"}.get(kind, kind)
 
 
 def rows_of(summary):

@@ -77,6 +77,7 @@ def check_markdown(out):
     assert costs[0] == f"| scene, budget | method | {columns} |", costs
     for line in costs[2:]:
         assert 0 < float(line.split("|")[-2]) < 9, f"not a mean relative to that of nine groups: {line}"
+    assert errors[3].startswith("| jewelry, 1 sample |"), errors
     assert len(costs) == 2 + 9 and any(line.startswith("| jewelry, 4 samples | a:path | 4 | ") for line in costs), costs
 
 
@@ -231,6 +232,8 @@ def check(driver, tools):
     digest = hashlib.sha256((tools / "loberender").read_bytes()).hexdigest()
     shown = driver.find_element(By.ID, "machine").text
     assert "loberender " in shown and f"(hash {digest[:8]}) as a." in shown, shown
+    headings = [cell.text for cell in driver.find_elements(By.CSS_SELECTOR, "#table tbody th")]
+    assert headings == ["jewelry, 1 s", "jewelry, 1 sample", "jewelry, 2 samples", "jewelry, 4 samples"], headings
     header = [cell.text for cell in driver.find_elements(By.CSS_SELECTOR, "#table thead th")]
     assert header == ["", "a:path", "a:depth-2.0", PEER], header
     peers = [row.find_elements(By.TAG_NAME, "td")[2].text for row in driver.find_elements(By.CSS_SELECTOR, "#table tbody tr")]
