@@ -160,10 +160,16 @@ def check_replaced(_, out):
     """Runs during which the tools were replaced are not taken for runs of the former ones."""
     tools = out.with_name("replaced")
     pretended_tools.make(tools)
-    former = (tools / "loberender").read_text()
-    (tools / "loberender").write_text(former + "if '-o' in sys.argv:\n    open(__file__, 'a').write('# new')\n")
-    _, errors = run(tools, out, "--spp", "1", "--methods", "path", "guided", code=1)
-    assert f"loberender in {tools} changed meanwhile" in errors and not complete_runs(out) and not list(out.rglob("*.begun")), errors
+    for tool in ("loberender", "lobefit", "lobecompare"):
+        former = (tools / tool).read_text()
+        os.environ["REPLACED"] = tool
+        _, errors = run(tools, out, "--spp", "1", "--methods", "path", "guided", code=1)
+        del os.environ["REPLACED"]
+        assert f"{tools / tool} was replaced meanwhile" in errors, errors
+        assert tool == "lobecompare" or not complete_runs(out) and not list(out.rglob("*.begun")), "a run is taken for one of the former tools"
+        assert not (out / "references.json").exists()
+        (tools / tool).write_text(former)
+    run(tools, out, "--spp", "1", "--methods", "path", "guided")
 
 
 def check_locked(tools, out):
