@@ -3,10 +3,10 @@
 import json
 import os
 import pathlib
-import subprocess
 import sys
 
 import results
+from commands import output
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 KEPT = ROOT / "build/bench"
@@ -17,14 +17,6 @@ def tool(name):
     if not path.is_file():
         sys.exit(f"{path}: no such tool; build it first (scripts/setup)")
     return path
-
-
-def output(*command, progress=False):
-    """Runs a command and returns its output. Shows its diagnostics only if it fails, or at once with progress."""
-    done = subprocess.run([str(part) for part in command], stdout=subprocess.PIPE, stderr=None if progress else subprocess.PIPE, text=True)
-    if done.returncode:
-        sys.exit((done.stderr or "").strip() or f"{command[0]} failed with code {done.returncode}")
-    return done.stdout
 
 
 def measured(file, keep, *commands):

@@ -1,23 +1,14 @@
 """What the scripts that measure and show errors have in common."""
 
 import collections
-import fcntl
+import csv
 import hashlib
-import importlib.machinery
-import importlib.util
+import io
 import json
 import math
-import os
 import pathlib
+import struct
 import sys
-
-
-def load_evaluate():
-    """The module scripts/evaluate, whose name has no suffix."""
-    loader = importlib.machinery.SourceFileLoader("evaluate", str(pathlib.Path(__file__).with_name("evaluate")))
-    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("evaluate", loader))
-    loader.exec_module(module)
-    return module
 
 
 def sha256(path):
@@ -36,20 +27,23 @@ def write(path, text):
     temporary.replace(path)
 
 
-def lock(out):
-    """Ends the script if another one works in the folder. The folder is locked as long as the returned file is open."""
-    file = open(out / ".lock", "w")
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        sys.exit(f"{out}: another command is working in this folder")
-    return file
+def write_csv(path, rows):
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    text = io.StringIO(newline="")
+    writer = csv.DictWriter(text, columns)
+    writer.writeheader()
+    writer.writerows(rows)
+    write(path, text.getvalue())
 
 
-def check_tools(parser, folder, names, option="--tools FOLDER"):
-    for tool in (folder / name for name in names):
-        if not (tool.is_file() and os.access(tool, os.X_OK)):
-            parser.error(f"{tool}: no such tool; build it, or name its folder by {option}")
+def exr_size(path):
+    """The size of the display window as WxH, from the header of the file."""
+    with open(path, "rb") as file:
+        _, _, window = file.read(1 << 20).partition(b"displayWindow\0box2i\0" + struct.pack("<i", 16))
+    if len(window) < 16:
+        raise ValueError(f"{path} is not an EXR file")
+    left, top, right, bottom = struct.unpack("<4i", window[:16])
+    return f"{right - left + 1}x{bottom - top + 1}"
 
 
 def is_biased(options):

@@ -206,10 +206,10 @@ def check_progress(folder):
     shown = os.read(controller, 1 << 16).decode()
     assert f"compiling the BRDF caches of {SCENE}, 2 of 2" in shown and f"comparing the pictures of {SCENE}" in shown, shown
     assert shown.endswith("\r\033[K"), "the line of the progress is not ended"
-    evaluate = results.load_evaluate()
-    slow, fast, timed = (evaluate.Run(SCENE, method, budget, 1) for method, budget in (
+    evaluate = runpy.run_path(str(ROOT / "scripts/evaluate"))
+    slow, fast, timed = (evaluate["Run"](SCENE, method, budget, 1) for method, budget in (
         ("product", ("--spp", "4")), ("path", ("--spp", "8")), ("path", ("--seconds", "60"))))
-    left = evaluate.TimeLeft()
+    left = evaluate["TimeLeft"]()
     assert left.text([slow], 1) == "" and left.text([timed], 1) == ", 1 min left", "the time of samples is not known before"
     left.add(slow, 240)
     assert left.text([slow, timed], 1) == ", 5 min left" and left.text([fast, fast], 2) == ", 8 min left", "not like the other method"
@@ -227,7 +227,7 @@ def check_pairs(folder):
         of_path = next(one for one in results.read_summary(folder / "pairs") if one["method"] == "a:path")
         assert of_path["pairs"] == 3, of_path
         assert abs(of_path["trimmed"] - value) < 1e-9 and abs(of_path["trimmed_spread"] - spread) < 1e-9, of_path
-    uncertainty = results.load_evaluate().uncertainty
+    uncertainty = runpy.run_path(str(ROOT / "scripts/evaluate"))["uncertainty"]
     tiny = {"trimmed": 1, "trimmed_low": None, "trimmed_high": None, "seeds": "1 2"}
     assert uncertainty([tiny], "trimmed") is None, "an uncertainty of 0"
     # Without seed i, the mean over the pairs is that of the sums of two of the other three seeds, (36 - i) * 2 / 3.
