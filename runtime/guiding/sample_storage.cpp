@@ -150,7 +150,8 @@ void SampleStorage::merge(SampleStorage&& other) {
 
 void SampleStorage::merge(std::span<SampleStorage> others) {
   std::vector<SampleStorageData*> data;
-  for (SampleStorage& other : others) data.push_back(other.data_.get());
+  for (SampleStorage& other : others)
+    if (&other != this) data.push_back(other.data_.get());
   data_->append(data);
 }
 

@@ -71,6 +71,17 @@ TEST_CASE("guiding: sample storages can be merged one at a time or all at once, 
     CHECK(contentOf(dataOf(all)) == both);
     CHECK(std::ranges::all_of(parts, [](const SampleStorage& s) { return s.particles() == 0; }));
   }
+  SECTION("into one of them") {
+    parts.front() = randomStorage(9);
+    std::vector<std::pair<std::uint64_t, float>> both = contentOf(dataOf(parts.front()));
+    REQUIRE(!both.empty());
+    std::ranges::copy(expected, std::back_inserter(both));
+    parts.front().merge(parts);
+    CHECK(contentOf(dataOf(parts.front())) == both);
+    CHECK(std::all_of(parts.begin() + 1, parts.end(), [](const SampleStorage& s) { return s.particles() == 0; }));
+    parts.front().merge(std::move(parts.front()));
+    CHECK(contentOf(dataOf(parts.front())) == both);
+  }
   SECTION("in another order") {
     std::ranges::reverse(parts);
     SampleStorage all;

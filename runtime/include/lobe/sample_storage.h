@@ -42,9 +42,10 @@ class SampleStorage {
   /// geometric normal on the side of the path.
   void requestRecord(const Float3& position, const Float3& normal);
 
-  /// Appends the content of another storage and leaves that one empty.
+  /// Appends the content of another storage and leaves that one empty. Does nothing if it is this storage.
   void merge(SampleStorage&& other);
-  /// Appends the contents of other storages in their order, in parallel, and leaves those empty.
+  /// Appends the contents of other storages in their order, in parallel, and leaves those empty. This storage may be
+  /// one of them: it keeps its content, and the others are appended.
   void merge(std::span<SampleStorage> others);
 
   /// Number of particles, from photons and camera paths.
