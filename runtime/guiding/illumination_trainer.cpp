@@ -70,6 +70,11 @@ void IlluminationTrainer::fill(std::span<const std::span<const Particle>> source
   if (!neighbours.empty()) makeRecords(neighbours, requests);
 }
 
+void IlluminationTrainer::Training::addIrradiance(float ofPass) {
+  ++passes;
+  irradiance += (ofPass - irradiance) / static_cast<float>(passes);
+}
+
 void IlluminationTrainer::learnFractions(std::span<const FractionSample> samples) {
   std::vector<std::vector<FractionSample>> ofRecord(records_.size());
   for (const FractionSample& s : samples) {
@@ -85,12 +90,11 @@ std::optional<double> IlluminationTrainer::updateAll(const ParticleNeighbours& n
   parallelFor(std::size_t{0}, records_.size(), [&](std::size_t i) {
     Training& record = records_[i];
     const Neighbourhood found = neighbours.around(record.position, record.normal, record.tangent);
+    if (neighbours.carryFlux()) record.addIrradiance(found.irradiance);
     if (found.points.empty()) return;
     likelihoods[i] = meanLogLikelihood(found.points, record.em.gaussians(), record.em.background());
     record.em.update(found.points);
     record.reservoir.add(found.points);
-    ++record.passes;
-    record.irradiance += (found.irradiance - record.irradiance) / static_cast<float>(record.passes);
     shrinkRadius(record);
   });
   double sum = 0;
@@ -140,11 +144,12 @@ std::optional<IlluminationTrainer::Training> IlluminationTrainer::makeRecord(con
                   tangent,
                   std::clamp(found.radius, 0.1f * unit_, unit_),
                   found.distance,
-                  found.irradiance,
-                  1,
+                  0,
+                  0,
                   StepwiseEm(options_.components),
                   {},
                   reservoirAt(request.position)};
+  if (neighbours.carryFlux()) record.addIrradiance(found.irradiance);
   record.em.fit(found.points);
   record.reservoir.add(found.points);
   shrinkRadius(record);

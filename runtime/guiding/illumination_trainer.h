@@ -59,11 +59,13 @@ class IlluminationTrainer {
     Vec3 position, normal, tangent;
     float radius;
     float distance;    // harmonic mean of the distances to the light's origin
-    float irradiance;  // mean over the passes since the record was created
-    int passes;
+    float irradiance;  // mean over the passes with photons since the record was created, also those without any near it
+    int passes;        // number of these passes
     StepwiseEm em;
     BsdfSamplingFraction fraction;
     PointReservoir reservoir;  // of the points that em was trained with
+
+    void addIrradiance(float ofPass);
   };
 
   std::optional<double> updateAll(const ParticleNeighbours& neighbours);

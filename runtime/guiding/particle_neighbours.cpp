@@ -103,6 +103,9 @@ ParticleNeighbours::ParticleNeighbours(std::span<const std::span<const Particle>
                                        float maxDistance) {
   std::vector<std::span<const Particle>> filled;
   std::ranges::copy_if(sources, std::back_inserter(filled), [](const auto& source) { return !source.empty(); });
+  carryFlux_ = std::ranges::any_of(filled, [](const auto& source) {
+    return std::ranges::any_of(source, [](const Particle& p) { return p.flux > 0; });
+  });
   trees_.resize(filled.size());
   parallelFor(std::size_t{0}, filled.size(),
               [&](std::size_t i) { trees_[i] = std::make_unique<Tree>(filled[i], count, maxDistance); });

@@ -34,6 +34,9 @@ class ParticleNeighbours {
   /// Whether no source has a particle.
   bool empty() const { return trees_.empty(); }
 
+  /// Whether a particle carries flux, from which the irradiance follows: photons do, samples of camera paths do not.
+  bool carryFlux() const { return carryFlux_; }
+
   /// The nearest particles that arrived on the side of n, at surfaces whose normal is within 45° of n. n, tangent: unit
   /// and orthogonal.
   Neighbourhood around(const Vec3& x, const Vec3& n, const Vec3& tangent) const;
@@ -41,6 +44,7 @@ class ParticleNeighbours {
  private:
   class Tree;
   std::vector<std::unique_ptr<Tree>> trees_;
+  bool carryFlux_;
 };
 
 }  // namespace lobe

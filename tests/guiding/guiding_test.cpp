@@ -211,6 +211,22 @@ TEST_CASE("guiding: training places records only near particles and no duplicate
   CHECK(trainer.cache().size() == 1);
 }
 
+TEST_CASE("guiding: the irradiance of a record is the mean over all passes with photons") {
+  IlluminationTrainer trainer({}, 10.0f);
+  std::vector<Particle> photons = planeParticles(20000, Vec3::UnitZ(), 0.5f, 1);
+  for (Particle& p : photons) p.flux = 1;
+  learn(trainer, photons, std::vector<RecordRequest>(1, RecordRequest{{0.5f, 0.5f, 0}, Vec3::UnitZ()}));
+  REQUIRE(trainer.cache().size() == 1);
+  const auto irradiance = [&] { return trainer.cache().records().front().irradiance; };
+  const float ofFirst = irradiance();
+  CHECK(ofFirst == Approx(20000).epsilon(0.3));
+  learn(trainer, planeParticles(20000, Vec3::UnitZ(), 0.5f, 2), {});  // of camera paths
+  CHECK(irradiance() == ofFirst);
+  for (Particle& p : photons) p.position.x() += 5;
+  learn(trainer, photons, {});  // no photon reaches the record
+  CHECK(irradiance() == Approx(0.5f * ofFirst));
+}
+
 TEST_CASE("guiding: particle sources of any scale are weighted by their effective number of samples") {
   const Vec3 left = Vec3(-0.6f, 0.0f, 0.8f), right = Vec3(0.6f, 0.0f, 0.8f);
   std::vector<Particle> dim = planeParticles(20000, left, 0.0f, 1), bright = planeParticles(20000, right, 0.0f, 2);
