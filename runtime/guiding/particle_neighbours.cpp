@@ -64,8 +64,19 @@ class NearestSet {
 struct Tally {
   double weight = 0, squares = 0, inverseDistance = 0, flux = 0;
   float radius2 = 0;
+  std::size_t count = 0;
 
   double effectiveSamples() const { return squares > 0 ? weight * weight / squares : 0; }
+
+  /// The irradiance by density estimation. reach2: square of the largest distance that was searched. The area is that
+  /// of the disc up to the farthest particle, because the surface may be smaller than the disc that was searched. The
+  /// farthest particle itself is not counted, which makes the estimate unbiased on a plane (Loftsgaarden and
+  /// Quesenberry 1965). With one or two particles its variance would be infinite; they are divided by the area that was
+  /// searched.
+  double irradiance(float reach2) const {
+    if (count < 3 || radius2 <= 0) return flux / (std::numbers::pi * reach2);
+    return flux * (1 - 1 / static_cast<double>(count)) / (std::numbers::pi * radius2);
+  }
 };
 
 }  // namespace
@@ -74,6 +85,8 @@ class ParticleNeighbours::Tree {
  public:
   Tree(std::span<const Particle> particles, int count, float maxDistance)
       : count_(count), maxDistance2_(maxDistance * maxDistance), tree_(particles) {}
+
+  float reach2() const { return maxDistance2_; }
 
   Tally collect(const Vec3& x, const Vec3& n, const Vec3& tangent, std::vector<WeightedPoint>& points) const {
     NearestSet nearest(tree_.particles(), n, count_, maxDistance2_);
@@ -89,6 +102,7 @@ class ParticleNeighbours::Tree {
       tally.squares += static_cast<double>(p.weight) * p.weight;
       tally.inverseDistance += p.weight / p.distance;
       tally.flux += p.flux;
+      ++tally.count;
     }
     return tally;
   }
@@ -121,7 +135,7 @@ Neighbourhood ParticleNeighbours::around(const Vec3& x, const Vec3& n, const Vec
     const Tally tally = tree->collect(x, n, tangent, all.points);
     const double effective = tally.effectiveSamples();
     // Of photons without weight, too, whose light only next-event estimation finds.
-    if (tally.radius2 > 0) all.irradiance += static_cast<float>(tally.flux / (std::numbers::pi * tally.radius2));
+    all.irradiance += static_cast<float>(tally.irradiance(tree->reach2()));
     if (!(effective > 0)) continue;
     const double scale = effective / tally.weight;
     for (std::size_t i = first; i < all.points.size(); ++i)

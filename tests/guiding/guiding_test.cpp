@@ -227,6 +227,28 @@ TEST_CASE("guiding: the irradiance of a record is the mean over all passes with 
   CHECK(irradiance() == Approx(0.5f * ofFirst));
 }
 
+TEST_CASE("guiding: the irradiance of few photons has the right mean") {
+  // On average an eighth of the photons in the unit square is in the disc that is searched.
+  constexpr float kReach = 0.2f;
+  constexpr std::uint64_t kTrials = 4000;
+  for (const int photons : {5, 25, 100}) {
+    CAPTURE(photons);
+    double sum = 0;
+    for (std::uint64_t trial = 0; trial < kTrials; ++trial) {
+      std::vector<Particle> particles = planeParticles(photons, Vec3::UnitZ(), 0.0f, trial);
+      for (Particle& p : particles) p.flux = 1 / static_cast<float>(photons);
+      const ParticleNeighbours neighbours(std::array{std::span<const Particle>(particles)}, 250, kReach);
+      sum += neighbours.around({0.5f, 0.5f, 0}, Vec3::UnitZ(), Vec3::UnitX()).irradiance;
+    }
+    CHECK(sum / kTrials == Approx(1).epsilon(0.1));
+  }
+  // On a surface that is smaller than the search, the density is that of the surface.
+  std::vector<Particle> particles = planeParticles(100, Vec3::UnitZ(), 0.0f, 1);
+  for (Particle& p : particles) p.flux = 0.01f;
+  const ParticleNeighbours neighbours(std::array{std::span<const Particle>(particles)}, 250, 10);
+  CHECK(neighbours.around({0.5f, 0.5f, 0}, Vec3::UnitZ(), Vec3::UnitX()).irradiance == Approx(2 / kPi).epsilon(0.2));
+}
+
 TEST_CASE("guiding: particle sources of any scale are weighted by their effective number of samples") {
   const Vec3 left = Vec3(-0.6f, 0.0f, 0.8f), right = Vec3(0.6f, 0.0f, 0.8f);
   std::vector<Particle> dim = planeParticles(20000, left, 0.0f, 1), bright = planeParticles(20000, right, 0.0f, 2);
