@@ -39,6 +39,11 @@ StrategyProbabilities onRepresentable(const StrategyProbabilities& probabilities
           representable * probabilities.illumination};
 }
 
+/// The nearest fraction in [0,1]; 1, so that only the BSDF is sampled, if it is not a number.
+float toFraction(float x) {
+  return x < 1 ? std::max(0.0f, x) : 1.0f;
+}
+
 /// The fraction of the described albedo that mixtures represent.
 float representableFraction(const Reflectance& reflectance) {
   const float all = reflectance.albedo + reflectance.unrepresentableAlbedo;
@@ -108,10 +113,10 @@ void SurfaceDistribution::describe(const SurfaceReflectance& reflectance, const 
   if (!hasRecord_) return;
   Impl& self = impl();
   self.product = caches != nullptr;
-  self.described = reflectance.undescribedFraction <= 0;
+  const float undescribed = toFraction(reflectance.undescribedFraction);
+  self.described = undescribed == 0;
   if (self.product) self.collectReflectance(reflectance, *caches->caches_);
-  self.representable =
-      (1 - reflectance.undescribedFraction) * (self.product ? representableFraction(self.reflectance) : 1);
+  self.representable = (1 - undescribed) * (self.product ? representableFraction(self.reflectance) : 1);
   assert(self.representable >= 0 && self.representable <= 1);
   decision_ = self.decide();
   if (decision_ == GuidingDecision::tooNarrow || decision_ == GuidingDecision::uniform) return;

@@ -191,6 +191,20 @@ TEST_CASE("guiding: the part of the reflection that mixtures do not represent is
   }
 }
 
+TEST_CASE("guiding: an undescribed fraction out of range counts as the nearest one, and NaN as one") {
+  const Field field = trained();
+  const auto bsdfProbability = [&](float undescribed) {
+    SurfaceDistribution guide(field, floorAt(0.5f, 0.5f));
+    guide.describe({.lobes = {}, .diffuseAlbedo = 0.5f, .undescribedFraction = undescribed}, nullptr);
+    CHECK(std::isfinite(guide.guidedPdf({0.6f, 0, 0.8f})));
+    return guide.bsdfProbability();
+  };
+  CHECK(bsdfProbability(-0.1f) == 0.5f);
+  CHECK(bsdfProbability(1.0000001f) == 1);
+  CHECK(bsdfProbability(std::numeric_limits<float>::infinity()) == 1);
+  CHECK(bsdfProbability(std::numeric_limits<float>::quiet_NaN()) == 1);
+}
+
 TEST_CASE("guiding: on the back of a surface, directions follow the light that arrives there") {
   // Light from below that no mirroring leaves in place. The field's frame is that of the world.
   const Vec3 light = Vec3(0.6f, 0.35f, -0.7f).normalized();

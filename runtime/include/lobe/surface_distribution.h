@@ -50,7 +50,8 @@ struct TintedLobe {
 struct SurfaceReflectance {
   std::span<const TintedLobe> lobes;
   float diffuseAlbedo = 0;  ///< albedo (luminance) of the part with constant BRDF value, albedo / π
-  /// Fraction in [0,1] of the non-delta albedo that is in neither of the above: transmission and lobes without a cache.
+  /// Fraction of the non-delta albedo that is in neither of the above: transmission and lobes without a cache. Values
+  /// below 0 count as 0; values above 1, and NaN, as 1.
   float undescribedFraction = 0;
 };
 
