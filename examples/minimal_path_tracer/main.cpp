@@ -196,7 +196,7 @@ float radiance(Float3 origin, Float3 direction, const Guide& guide, lobe::Sample
   float result = 0, throughput = 1;
   for (int depth = 0; depth < 12; ++depth) {
     const std::optional<Hit> hit = trace(origin, direction);
-    if (recorder && depth > 0) recorder->setDistance(hit ? hit->distance : kInfinity);
+    if (recorder) recorder->setDistance(hit ? hit->distance : kInfinity);
     if (!hit) break;
     result += throughput * hit->sphere->emission;
     if (recorder) recorder->addLight(grey(throughput * hit->sphere->emission));

@@ -20,12 +20,12 @@ bool usable(float weight) {
 void PathRecorder::begin(std::uint64_t pathIndex) {
   storage_->beginPath(pathIndex);
   count_ = 0;
-  ignored_ = false;
+  awaitsDistance_ = false;
 }
 
 void PathRecorder::addVertex(const RecordedVertex& recorded, const SurfaceDistribution* distribution) {
-  ignored_ = count_ == kMaxVertices;
-  if (ignored_) return;
+  awaitsDistance_ = count_ < kMaxVertices;
+  if (!awaitsDistance_) return;
   const Vec3 direction = toEigen(recorded.direction);
   const Vec3 front = toEigen(recorded.normal);
   const Vec3 normal = std::copysign(1.0f, front.dot(direction)) * front;
@@ -45,7 +45,8 @@ void PathRecorder::addVertex(const RecordedVertex& recorded, const SurfaceDistri
 }
 
 void PathRecorder::setDistance(float distance) {
-  if (count_ > 0 && !ignored_) vertices_[static_cast<std::size_t>(count_ - 1)].distance = distance;
+  if (awaitsDistance_) vertices_[static_cast<std::size_t>(count_ - 1)].distance = distance;
+  awaitsDistance_ = false;
 }
 
 // Light that reaches the camera passes through every earlier vertex, where it is incident radiance from the next
@@ -74,6 +75,7 @@ void PathRecorder::end() {
           {v.fraction->record, v.fraction->bsdfPdf, v.fraction->mixturePdf, v.fraction->representable, fractionWeight});
   }
   count_ = 0;
+  awaitsDistance_ = false;
 }
 
 }  // namespace lobe

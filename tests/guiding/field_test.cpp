@@ -142,6 +142,7 @@ TEST_CASE("guiding: a recorded path gives each vertex its incident radiance") {
   SampleStorage storage;
   PathRecorder recorder(storage);
   recorder.begin(3);
+  recorder.setDistance(7);  // from the camera to the first vertex
   const float h = std::sqrt(0.5f);
   // The throughput is 0.5 after the first vertex and 0.1 after the second; the path finds light of 1 and then of 0.8.
   recorder.addVertex({.position = {0, 0, 0},
@@ -153,6 +154,7 @@ TEST_CASE("guiding: a recorded path gives each vertex its incident radiance") {
                       .throughput = {0.5f, 0.5f, 0.5f}},
                      nullptr);
   recorder.setDistance(2);
+  recorder.setDistance(5);  // after delta scattering, which adds no vertex
   recorder.addLight({1, 1, 1});
   recorder.addVertex({.position = {1, 0, 1},
                       .normal = {0, 0, 1},

@@ -45,7 +45,8 @@ class PathRecorder {
   void addVertex(const RecordedVertex& vertex, const SurfaceDistribution* distribution);
 
   /// Sets the distance, in world units, from the last vertex to the next surface in the sampled direction; +infinity
-  /// (the default) if the ray hits nothing.
+  /// (the default) if the ray hits nothing. Only the first call after addVertex has an effect, so that it can be called
+  /// for every ray of the path, also for those that delta scattering continues without a vertex.
   void setDistance(float distance);
 
   /// Adds light that the path collects, as a contribution to the pixel: radiance times throughput and the weight of
@@ -74,7 +75,7 @@ class PathRecorder {
   PathRecorderOptions options_;
   std::array<Vertex, kMaxVertices> vertices_;
   int count_ = 0;
-  bool ignored_ = false;  // the last vertex was beyond kMaxVertices
+  bool awaitsDistance_ = false;  // the last vertex has no distance yet
 };
 
 }  // namespace lobe

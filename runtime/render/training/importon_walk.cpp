@@ -15,8 +15,7 @@ void ImportonWalk::run(const Ray& cameraRay, std::uint64_t index) {
 // Traces one segment and processes its end point; returns false when the path ends.
 bool ImportonWalk::advance() {
   const std::optional<SurfaceHit> hit = depth_ == 1 ? scene_.firstVisible(state_.ray) : scene_.tracer.trace(state_.ray);
-  if (awaitsDistance_) recorder_.setDistance(hit ? hit->distance : kInfinity);
-  awaitsDistance_ = false;
+  recorder_.setDistance(hit ? hit->distance : kInfinity);
   if (!hit) {
     escape();
     return false;
@@ -99,7 +98,6 @@ void ImportonWalk::remember(const SurfaceHit& hit, const GuidedSampler::Vertex& 
                        .weight = asFloats(scattered.weight),
                        .throughput = asFloats(state_.weight)},
                       &vertex.distribution());
-  awaitsDistance_ = true;
 }
 
 }  // namespace lobe

@@ -70,8 +70,7 @@ class ImportonWalk {
   ParticleState state_;
   int depth_ = 0;
   EmissionWeight emissionWeight_;
-  bool scattered_ = false;       // at a non-delta component at least once
-  bool awaitsDistance_ = false;  // the recorder needs the distance from the last vertex
+  bool scattered_ = false;  // at a non-delta component at least once
   PathRecorder recorder_;
 };
 
