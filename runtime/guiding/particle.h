@@ -12,7 +12,9 @@ struct Particle {
   Vec3 normal;     ///< unit geometric normal on the side where the light arrived
   Vec3 direction;  ///< unit, from the surface towards the light's origin
   float weight;    ///< luminance, ≥ 0; of photons the flux, without the part handled by next-event estimation
-  float distance;  ///< world units travelled since the last vertex; +infinity for light from the environment
+  /// World units travelled since the last vertex, > 0; +infinity for light from the environment. Other values count as
+  /// infinite.
+  float distance;
   /// Total flux (luminance), before subtracting the part handled by next-event estimation. 0 for samples of camera
   /// paths, whose density does not give the irradiance.
   float flux = 0;

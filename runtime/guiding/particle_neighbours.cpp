@@ -100,7 +100,8 @@ class ParticleNeighbours::Tree {
       tally.radius2 = std::max(tally.radius2, neighbour.distance2);
       tally.weight += p.weight;
       tally.squares += static_cast<double>(p.weight) * p.weight;
-      tally.inverseDistance += p.weight / p.distance;
+      // A single 0, from a light that touches the surface, would make the harmonic mean 0.
+      if (p.distance > 0) tally.inverseDistance += p.weight / p.distance;
       tally.flux += p.flux;
       ++tally.count;
     }

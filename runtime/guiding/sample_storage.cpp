@@ -135,7 +135,7 @@ void SampleStorage::beginPath(std::uint64_t index) {
 
 void SampleStorage::addPhoton(const Float3& position, const Float3& normal, const Float3& direction, float weight,
                               float distance, float flux) {
-  const bool usable = std::isfinite(weight) && weight >= 0 && std::isfinite(flux) && flux >= 0 && distance >= 0;
+  const bool usable = std::isfinite(weight) && weight >= 0 && std::isfinite(flux) && flux >= 0;
   if (!usable || !isFinite(position) || !isFinite(normal) || !isFinite(direction)) return;
   data_->photons.push_back({toEigen(position), toEigen(normal), toEigen(direction), weight, distance, flux});
 }

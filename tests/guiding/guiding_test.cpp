@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include <cstring>
+#include <limits>
 #include <numbers>
 
 #include "runtime/core/random.h"
@@ -270,6 +271,17 @@ TEST_CASE("guiding: particle sources of any scale are weighted by their effectiv
   const ParticleNeighbours spoilt(std::array{std::span<const Particle>(dim)}, 250, 1);
   for (const WeightedPoint& p : spoilt.around(x, Vec3::UnitZ(), Vec3::UnitX()).points) sum += p.weight;
   CHECK(sum == Approx(1).epsilon(0.01));
+}
+
+TEST_CASE("guiding: distances that are not positive count as infinite") {
+  std::vector<Particle> particles = planeParticles(100, Vec3::UnitZ(), 0.0f, 1);  // of distance 10
+  for (std::size_t i = 0; i < 60; i += 3) {
+    particles[i].distance = 0;
+    particles[i + 1].distance = -1;
+    particles[i + 2].distance = std::numeric_limits<float>::quiet_NaN();
+  }
+  const ParticleNeighbours neighbours(std::array{std::span<const Particle>(particles)}, 250, 10);
+  CHECK(neighbours.around({0.5f, 0.5f, 0}, Vec3::UnitZ(), Vec3::UnitX()).distance == Approx(10 / 0.4f));
 }
 
 TEST_CASE("guiding: the search finds exactly the nearest particles") {

@@ -44,9 +44,10 @@ class PathRecorder {
   /// delta scattering.
   void addVertex(const RecordedVertex& vertex, const SurfaceDistribution* distribution);
 
-  /// Sets the distance, in world units, from the last vertex to the next surface in the sampled direction; +infinity
-  /// (the default) if the ray hits nothing. Only the first call after addVertex has an effect, so that it can be called
-  /// for every ray of the path, also for those that delta scattering continues without a vertex.
+  /// Sets the distance, in world units, from the last vertex to the next surface in the sampled direction, > 0;
+  /// +infinity (the default) if the ray hits nothing, as which other values count. Only the first call after addVertex
+  /// has an effect, so that it can be called for every ray of the path, also for those that delta scattering continues
+  /// without a vertex.
   void setDistance(float distance);
 
   /// Adds light that the path collects, as a contribution to the pixel: radiance times throughput and the weight of

@@ -31,7 +31,8 @@ class SampleStorage {
   /// normal: unit geometric normal on the side where the photon arrived.
   /// direction: unit, from the surface to where the photon came from.
   /// weight: flux (luminance), ≥ 0, without the part that next-event estimation handles better.
-  /// distance: world units travelled since the last vertex; +infinity for light from the environment.
+  /// distance: world units travelled since the last vertex, > 0; +infinity for light from the environment, as which
+  /// other values count.
   /// flux: total flux (luminance), ≥ 0, before subtracting the part handled by next-event estimation. The irradiance of
   /// records is estimated from it: divide it by the number of photons of the pass, so that all passes use the same
   /// unit.
