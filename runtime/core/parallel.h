@@ -14,6 +14,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 #include <tbb/parallel_sort.h>
+#include <tbb/task_arena.h>
 #include <tbb/task_group.h>
 
 namespace lobe {
@@ -126,6 +127,13 @@ void parallelInvoke(const Functions&... functions) {
   ForkJoin order;
   tbb::parallel_invoke([&] { order.run(functions); }..., context);
   if (context.is_group_execution_cancelled()) throw LoopCancelled();
+}
+
+/// Returns f(). A thread that waits for a loop of f in the meantime runs no tasks from outside of f: in a library,
+/// those would be tasks of the host, which may hold locks or use thread-local data.
+template <class Function>
+auto isolated(const Function& f) {
+  return tbb::this_task_arena::isolate(f);
 }
 
 }  // namespace lobe

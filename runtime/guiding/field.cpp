@@ -7,6 +7,7 @@
 
 #include "runtime/core/atomic_file.h"
 #include "runtime/core/files.h"
+#include "runtime/core/parallel.h"
 #include "runtime/guiding/field_data.h"
 #include "runtime/guiding/illumination_store.h"
 #include "runtime/guiding/sample_storage_data.h"
@@ -49,7 +50,7 @@ Field::Field() : data_(std::make_shared<FieldData>()) {}
 
 Field::Field(const FieldOptions& options, const Field& earlier) : data_(std::make_shared<FieldData>()) {
   options.validate();
-  data_->trainer.emplace(trainingOptions(options), options.sceneDiagonal, earlier.cache().records());
+  isolated([&] { data_->trainer.emplace(trainingOptions(options), options.sceneDiagonal, earlier.cache().records()); });
 }
 
 Field::Field(std::shared_ptr<FieldData> data) : data_(std::move(data)) {}
@@ -59,7 +60,8 @@ Field& Field::operator=(const Field&) = default;
 
 Field Field::load(const std::filesystem::path& path) {
   auto data = std::make_shared<FieldData>();
-  data->frozen = loadIllumination(IlluminationFile::open(path));
+  const IlluminationFile file = IlluminationFile::open(path);
+  data->frozen = isolated([&] { return loadIllumination(file); });
   return Field(std::move(data));
 }
 
@@ -72,23 +74,28 @@ void Field::save(const std::filesystem::path& path) const {
 
 std::optional<double> Field::update(const SampleStorage& storage) {
   IlluminationTrainer& trainer = trainerOf(*data_);
-  return inOrder(*storage.data_, [&](const SampleStorageData& data) {
+  const auto learn = [&](const SampleStorageData& data) {
     trainer.learnFractions(data.fractions);
     return trainer.learn(std::array{std::span<const Particle>(data.photons), std::span<const Particle>(data.samples)},
                          data.requests);
-  });
+  };
+  return isolated([&] { return inOrder(*storage.data_, learn); });
 }
 
 void Field::refit() {
-  trainerOf(*data_).refit();
+  IlluminationTrainer& trainer = trainerOf(*data_);
+  isolated([&] { trainer.refit(); });
 }
 
 void Field::fill(const SampleStorage& requests, const SampleStorage& particles) {
   IlluminationTrainer& trainer = trainerOf(*data_);
-  inOrder(*requests.data_, [&](const SampleStorageData& asked) {
-    inOrder(*particles.data_, [&](const SampleStorageData& data) {
-      trainer.fill(std::array{std::span<const Particle>(data.photons), std::span<const Particle>(data.samples)},
-                   asked.requests);
+  const auto fillFrom = [&](const SampleStorageData& asked, const SampleStorageData& data) {
+    trainer.fill(std::array{std::span<const Particle>(data.photons), std::span<const Particle>(data.samples)},
+                 asked.requests);
+  };
+  isolated([&] {
+    inOrder(*requests.data_, [&](const SampleStorageData& asked) {
+      inOrder(*particles.data_, [&](const SampleStorageData& data) { fillFrom(asked, data); });
     });
   });
 }
@@ -102,7 +109,7 @@ const IlluminationCache& Field::cache() const {
 }
 
 Field Field::reduced(float cost) const {
-  return fieldOf(lobe::reduced(cache(), cost));
+  return fieldOf(isolated([&] { return lobe::reduced(cache(), cost); }));
 }
 
 double Field::meanComponents() const {

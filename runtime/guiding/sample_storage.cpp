@@ -152,7 +152,7 @@ void SampleStorage::merge(std::span<SampleStorage> others) {
   std::vector<SampleStorageData*> data;
   for (SampleStorage& other : others)
     if (&other != this) data.push_back(other.data_.get());
-  data_->append(data);
+  isolated([&] { data_->append(data); });
 }
 
 std::size_t SampleStorage::particles() const {

@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numeric>
 #include <span>
 #include <vector>
 
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
 #include <catch2/catch.hpp>
 
 #include "lobe/field.h"
@@ -60,7 +63,35 @@ ShadingPoint floorAt(float x, float y) {
   return {{x, y, 0}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, 1}};
 }
 
+/// Whether this thread is in a call of the library.
+thread_local bool inLibrary = false;
+
 }  // namespace
+
+TEST_CASE("guiding: a thread that waits for the library runs no tasks of the host") {
+  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 4);
+  std::atomic<int> nested = 0, records = 0;
+  tbb::parallel_for(0, 200, [&](int) {
+    nested += inLibrary ? 1 : 0;
+    std::vector<SampleStorage> parts;
+    for (int i = 0; i < 4; ++i) {
+      std::vector<int> some(300);
+      std::iota(some.begin(), some.end(), 300 * i);
+      parts.push_back(paths(some));
+    }
+    Field field(smallField());
+    SampleStorage all;
+    inLibrary = true;
+    all.merge(parts);
+    field.update(all);
+    field.refit();
+    field.fill(all, all);
+    inLibrary = false;
+    records += static_cast<int>(field.records());
+  });
+  CHECK(nested == 0);
+  CHECK(records > 0);
+}
 
 TEST_CASE("guiding: a field does not depend on the assignment of paths to threads") {
   std::vector<int> even, odd;

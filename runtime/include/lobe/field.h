@@ -45,6 +45,11 @@ Field fieldOf(IlluminationCache cache);
 ///
 /// Threads: update, refit and fill must not run while another thread uses the field or a copy of it. All other
 /// functions are const and may be called from any thread.
+///
+/// Parallel loops: the functions that create or change records use oneTBB, in the task arena of the calling thread,
+/// whose number of threads the host may limit. They may be called in a task; a thread that waits for them runs no other
+/// tasks of the host meanwhile. If the task group of that task is cancelled, they throw std::runtime_error. After any
+/// exception, std::bad_alloc included, the records may have been updated in part.
 class Field {
  public:
   /// A field without records that cannot be trained.

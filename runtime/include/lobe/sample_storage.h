@@ -46,7 +46,8 @@ class SampleStorage {
   /// Appends the content of another storage and leaves that one empty. Does nothing if it is this storage.
   void merge(SampleStorage&& other);
   /// Appends the contents of other storages in their order, in parallel, and leaves those empty. This storage may be
-  /// one of them: it keeps its content, and the others are appended.
+  /// one of them: it keeps its content, and the others are appended. Like the functions of Field, uses oneTBB in the
+  /// task arena of the calling thread. After an exception, the contents are incomplete.
   void merge(std::span<SampleStorage> others);
 
   /// Number of particles, from photons and camera paths.
