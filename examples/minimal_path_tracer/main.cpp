@@ -206,14 +206,14 @@ float radiance(Float3 origin, Float3 direction, const Guide& guide, lobe::Sample
     const Bsdf bsdf{hit->sphere->diffuse, hit->sphere->glossy, frame.toLocal(-1 * direction)};
     std::optional<lobe::SurfaceDistribution> distribution;
     if (guide.field) {
-      distribution.emplace(*guide.field,
-                           lobe::ShadingPoint{hit->position, hit->normal, frame.s, frame.t, frame.n, bsdf.wo});
+      const lobe::ShadingPoint point{hit->position, hit->normal, frame.s, frame.t, frame.n, bsdf.wo};
+      distribution.emplace(*guide.field, point);
       const lobe::TintedLobe glossy{0, bsdf.glossy};
       if (distribution->hasRecord())
         distribution->describe({.lobes = {&glossy, bsdf.glossy > 0 ? 1u : 0u}, .diffuseAlbedo = bsdf.diffuse},
                                guide.caches);
       else if (storage)
-        storage->requestRecord(hit->position, hit->normal);
+        storage->requestRecord(point);
     }
     const std::optional<Direction> next = sampleDirection(bsdf, distribution ? &*distribution : nullptr, random);
     if (!next) break;

@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-#include "lobe/types.h"
+#include "lobe/surface_distribution.h"
 #include "runtime/mixture/disc.h"
 
 namespace lobe {
@@ -21,6 +21,11 @@ inline Float2 toFloats(const Vec2& v) {
 }
 inline Float3 toFloats(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
+}
+
+/// 1 if the path is on the side of the shading normal, else −1.
+inline float sideOf(const ShadingPoint& point) {
+  return point.wo.z >= 0 ? 1.0f : -1.0f;
 }
 
 inline bool isFinite(const Float3& v) {

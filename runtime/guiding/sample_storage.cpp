@@ -140,6 +140,10 @@ void SampleStorage::addPhoton(const Float3& position, const Float3& normal, cons
   data_->photons.push_back({toEigen(position), toEigen(normal), toEigen(direction), weight, distance, flux});
 }
 
+void SampleStorage::requestRecord(const ShadingPoint& point) {
+  requestRecord(point.position, toFloats(Vec3(sideOf(point) * toEigen(point.normal))));
+}
+
 void SampleStorage::requestRecord(const Float3& position, const Float3& normal) {
   if (isFinite(position) && isFinite(normal)) data_->requests.push_back({toEigen(position), toEigen(normal)});
 }

@@ -85,7 +85,7 @@ FractionSample SurfaceDistribution::Impl::fractionSample(const Vec3& wi, float b
 SurfaceDistribution::SurfaceDistribution(const Field& field, const ShadingPoint& point) {
   static_assert(kProductProbabilities.bsdf == kInitialBsdfFraction);
   static_assert(sizeof(Impl) <= kBytes && alignof(Impl) <= kAlignment && std::is_trivially_destructible_v<Impl>);
-  const float side = point.wo.z >= 0 ? 1.0f : -1.0f;
+  const float side = sideOf(point);
   const PackedRecord* record = field.cache().find(toEigen(point.position), side * toEigen(point.normal));
   if (!record) return;
   hasRecord_ = true;

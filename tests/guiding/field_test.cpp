@@ -272,6 +272,18 @@ TEST_CASE("guiding: on the back of a surface, directions follow the light that a
   CHECK(near > 180);
 }
 
+TEST_CASE("guiding: a record is requested on the side of a point from which it is looked up") {
+  SampleStorage storage;
+  storage.beginPath(0);
+  for (const float side : {1.0f, -1.0f}) {
+    ShadingPoint point = floorAt(0.5f, 0.25f);
+    point.wo = {0, 0, side};
+    storage.requestRecord(point);
+    CHECK(dataOf(storage).requests.back().position == Vec3(0.5f, 0.25f, 0));
+    CHECK(dataOf(storage).requests.back().normal == Vec3(0, 0, side));
+  }
+}
+
 TEST_CASE("guiding: filling creates the missing records and keeps the others") {
   std::vector<int> all(2000);
   std::iota(all.begin(), all.end(), 0);

@@ -11,6 +11,7 @@
 namespace lobe {
 
 struct SampleStorageData;
+struct ShadingPoint;
 
 /// Holds particles, requests for records and samples for the BSDF sampling fraction. Not thread-safe: use one storage
 /// per thread and merge them. Field::update sorts the samples by the index of their path, so that the result does not
@@ -39,8 +40,10 @@ class SampleStorage {
   void addPhoton(const Float3& position, const Float3& normal, const Float3& direction, float weight, float distance,
                  float flux);
 
-  /// Requests a record at a point that no record serves (see SurfaceDistribution::hasRecord). World space; normal: unit
-  /// geometric normal on the side of the path.
+  /// Requests a record at a point that no record serves (see SurfaceDistribution::hasRecord), on the side of wo.
+  void requestRecord(const ShadingPoint& point);
+  /// The same for a point in world space. normal: unit geometric normal on the side of the path, which is the other
+  /// side than that of ShadingPoint::normal if ShadingPoint::wo.z < 0.
   void requestRecord(const Float3& position, const Float3& normal);
 
   /// Appends the content of another storage and leaves that one empty. Does nothing if it is this storage.
