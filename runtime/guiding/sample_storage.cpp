@@ -145,7 +145,10 @@ void SampleStorage::requestRecord(const ShadingPoint& point) {
 }
 
 void SampleStorage::requestRecord(const Float3& position, const Float3& normal) {
-  if (isFinite(position) && isFinite(normal)) data_->requests.push_back({toEigen(position), toEigen(normal)});
+  const Vec3 n = toEigen(normal);
+  const float length = n.norm();  // not finite if n is not
+  if (isFinite(position) && length > 0 && std::isfinite(length))
+    data_->requests.push_back({toEigen(position), n / length});
 }
 
 void SampleStorage::merge(SampleStorage&& other) {

@@ -284,6 +284,25 @@ TEST_CASE("guiding: a record is requested on the side of a point from which it i
   }
 }
 
+TEST_CASE("guiding: the normals of requests are normalised") {
+  std::vector<int> all(2000);
+  std::iota(all.begin(), all.end(), 0);
+  const SampleStorage particles = paths(all);
+  SampleStorage requests;
+  requests.beginPath(0);
+  requests.requestRecord({0.5f, 0.5f, 0}, {0, 0, 0});
+  requests.requestRecord({0.5f, 0.5f, 0}, {0, 0, std::numeric_limits<float>::quiet_NaN()});
+  requests.requestRecord({0.5f, 0.5f, 0}, {0, 0, std::numeric_limits<float>::infinity()});
+  CHECK(dataOf(requests).requests.empty());
+  requests.requestRecord({0.5f, 0.5f, 0}, {0, 0, 1.001f});
+  Field field(smallField());
+  field.fill(requests, particles);
+  REQUIRE(field.records() == 1);
+  const test::Folder folder;
+  field.save(folder / "a.illum");
+  CHECK(Field::load(folder / "a.illum").records() == 1);
+}
+
 TEST_CASE("guiding: filling creates the missing records and keeps the others") {
   std::vector<int> all(2000);
   std::iota(all.begin(), all.end(), 0);

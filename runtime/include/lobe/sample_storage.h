@@ -42,8 +42,9 @@ class SampleStorage {
 
   /// Requests a record at a point that no record serves (see SurfaceDistribution::hasRecord), on the side of wo.
   void requestRecord(const ShadingPoint& point);
-  /// The same for a point in world space. normal: unit geometric normal on the side of the path, which is the other
-  /// side than that of ShadingPoint::normal if ShadingPoint::wo.z < 0.
+  /// The same for a point in world space. normal: geometric normal on the side of the path, which is the other side
+  /// than that of ShadingPoint::normal if ShadingPoint::wo.z < 0. It is normalised; requests without a direction are
+  /// dropped.
   void requestRecord(const Float3& position, const Float3& normal);
 
   /// Appends the content of another storage and leaves that one empty. Does nothing if it is this storage.
