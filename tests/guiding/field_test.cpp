@@ -14,6 +14,7 @@
 #include <catch2/catch.hpp>
 
 #include "lobe/field.h"
+#include "lobe/fitting.h"
 #include "lobe/path_recorder.h"
 #include "lobe/surface_distribution.h"
 #include "runtime/core/random.h"
@@ -122,6 +123,11 @@ TEST_CASE("guiding: a loaded field equals the saved one and cannot be trained fu
   FieldOptions options;
   options.components = 9;
   CHECK_THROWS_WITH(Field(options), Catch::Contains("components"));
+}
+
+TEST_CASE("guiding: a lobe and the request for its cache have the same revision unless it is set") {
+  const LobeRequest request{.model = "phong", .key = "phong exponent=60", .material = "glossy"};
+  CHECK(request.revision == LobeFunctions().revision);
 }
 
 TEST_CASE("guiding: without a record only the BSDF is sampled") {

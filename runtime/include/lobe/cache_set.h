@@ -17,7 +17,7 @@ class BrdfCaches;
 /// A lobe of one of the scene's materials, whose cache file is needed.
 struct LobeRequest {
   std::string model, key;  ///< as in LobeFunctions; they determine the file name
-  int revision;            ///< revision of the model's code; a cache of another revision is stale
+  int revision = 1;        ///< revision of the model's code, as in LobeFunctions; a cache of another one is stale
   std::string material;    ///< name of the material, for error messages
 };
 
