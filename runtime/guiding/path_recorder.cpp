@@ -11,8 +11,8 @@
 namespace lobe {
 namespace {
 
-bool usable(float weight) {
-  return weight > 0 && std::isfinite(weight);
+bool usable(float x) {
+  return x > 0 && std::isfinite(x);
 }
 
 }  // namespace
@@ -70,7 +70,7 @@ void PathRecorder::end() {
       data.samples.push_back({toEigen(v.position), toEigen(v.normal), toEigen(v.direction), weight, v.distance});
     if (!v.fraction) continue;
     const float fractionWeight = v.fraction->weight * v.radiance;
-    if (usable(fractionWeight))
+    if (usable(fractionWeight) && usable(v.fraction->bsdfPdf))
       data.fractions.push_back(
           {v.fraction->record, v.fraction->bsdfPdf, v.fraction->mixturePdf, v.fraction->representable, fractionWeight});
   }

@@ -212,6 +212,36 @@ TEST_CASE("guiding: a recorded path gives each vertex its incident radiance") {
   CHECK(samples[1].distance == std::numeric_limits<float>::infinity());
 }
 
+TEST_CASE("guiding: a vertex without the density of the BSDF is no sample for the BSDF sampling fraction") {
+  const Field field = trained();
+  const LobeCacheSet caches("", {}, "");
+  SurfaceDistribution guide(field, floorAt(0.5f, 0.5f));
+  guide.describe({.lobes = {}, .diffuseAlbedo = 0.5f}, &caches);
+  REQUIRE(guide.learnsFraction());
+  const auto samplesWith = [&](float bsdfPdf) {
+    SampleStorage storage;
+    PathRecorder recorder(storage);
+    recorder.begin(0);
+    recorder.addVertex({.position = {0.5f, 0.5f, 0},
+                        .normal = {0, 0, 1},
+                        .direction = {0.6f, 0, 0.8f},
+                        .wi = {0.6f, 0, 0.8f},
+                        .pdf = 1,
+                        .bsdfPdf = bsdfPdf,
+                        .weight = {0.5f, 0.5f, 0.5f},
+                        .throughput = {0.5f, 0.5f, 0.5f}},
+                       &guide);
+    recorder.addLight({1, 1, 1});
+    recorder.end();
+    CHECK(storage.particles() == 1);
+    return dataOf(storage).fractions.size();
+  };
+  CHECK(samplesWith(0.25f) == 1);
+  CHECK(samplesWith(0) == 0);
+  CHECK(samplesWith(std::numeric_limits<float>::infinity()) == 0);
+  CHECK(samplesWith(std::numeric_limits<float>::quiet_NaN()) == 0);
+}
+
 TEST_CASE("guiding: the part of the reflection that mixtures do not represent is left to the BSDF") {
   const Field field = trained();
   for (const float undescribed : {0.0f, 0.4f, 1.0f}) {

@@ -17,9 +17,11 @@ struct RecordedVertex {
   Float3 direction;         ///< the sampled direction: unit, world space, away from the surface
   Float3 wi;                ///< the same direction in the shading frame of the ShadingPoint
   float pdf;                ///< density over solid angle with which the direction was sampled, > 0
-  float bsdfPdf = 0;        ///< density of the BSDF's own sampler, over solid angle; used only if learnsFraction()
-  Float3 weight;            ///< BSDF value times |cosθ| / pdf
-  Float3 throughput;        ///< path throughput, including `weight`, before Russian roulette at this vertex
+  /// Density over solid angle of the BSDF's own sampler, > 0. Only needed for the BSDF sampling fraction, if
+  /// learnsFraction(); without it, the vertex is no sample for that.
+  float bsdfPdf = 0;
+  Float3 weight;      ///< BSDF value times |cosθ| / pdf
+  Float3 throughput;  ///< path throughput, including `weight`, before Russian roulette at this vertex
 };
 
 struct PathRecorderOptions {
