@@ -1,6 +1,7 @@
 # Run by ctest: cmake -DBUILD=... -DLOBE=... -P package_test.cmake
 # Builds the two libraries for any x86-64 machine and without the renderer, installs them into a new prefix, and builds and
 # runs the example against that prefix alone. Without much optimisation, because most of the time is that of the compiler.
+# Then configures a host that adds Lobe as a subdirectory.
 set(work ${BUILD}/package-test)
 file(REMOVE_RECURSE ${work})
 function(run)
@@ -14,4 +15,15 @@ run(${CMAKE_COMMAND} -S ${LOBE}/examples/minimal_path_tracer -B ${work}/example 
     -DCMAKE_PREFIX_PATH=${work}/prefix)
 run(${CMAKE_COMMAND} --build ${work}/example)
 run(${work}/example/minimal_path_tracer)
+
+# A host that adds Lobe as a subdirectory. It is only configured, because building it would compile the libraries
+# once more.
+file(WRITE ${work}/host/CMakeLists.txt "
+cmake_minimum_required(VERSION 3.25)
+project(host LANGUAGES CXX)
+add_subdirectory(${LOBE} lobe)
+add_executable(host ${LOBE}/examples/minimal_path_tracer/main.cpp)
+target_link_libraries(host PRIVATE lobe::guiding lobe::fitting)
+")
+run(${CMAKE_COMMAND} -S ${work}/host -B ${work}/host/build -G Ninja -DCMAKE_BUILD_TYPE=Release -DLOBE_BUILD_FITTER=ON)
 file(REMOVE_RECURSE ${work})
