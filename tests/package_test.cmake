@@ -16,14 +16,28 @@ run(${CMAKE_COMMAND} -S ${LOBE}/examples/minimal_path_tracer -B ${work}/example 
 run(${CMAKE_COMMAND} --build ${work}/example)
 run(${work}/example/minimal_path_tracer)
 
-# A host that adds Lobe as a subdirectory. It is only configured, because building it would compile the libraries
+# A host with fast mathematics that adds Lobe as a subdirectory. It is only configured, because building it would compile the libraries
 # once more.
 file(WRITE ${work}/host/CMakeLists.txt "
 cmake_minimum_required(VERSION 3.25)
 project(host LANGUAGES CXX)
+add_compile_options(-ffast-math)
 add_subdirectory(${LOBE} lobe)
 add_executable(host ${LOBE}/examples/minimal_path_tracer/main.cpp)
 target_link_libraries(host PRIVATE lobe::guiding lobe::fitting)
 ")
-run(${CMAKE_COMMAND} -S ${work}/host -B ${work}/host/build -G Ninja -DCMAKE_BUILD_TYPE=Release -DLOBE_BUILD_FITTER=ON)
+run(${CMAKE_COMMAND} -S ${work}/host -B ${work}/host/build -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_EXPORT_COMPILE_COMMANDS=ON
+    -DLOBE_BUILD_FITTER=ON)
+file(READ ${work}/host/build/compile_commands.json commands)
+string(JSON count LENGTH ${commands})
+math(EXPR last "${count} - 1")
+foreach(i RANGE ${last})
+  string(JSON command GET ${commands} ${i} command)
+  if(command MATCHES "minimal_path_tracer")
+    continue()
+  endif()
+  if(NOT command MATCHES " -ffast-math .*-fno-fast-math" OR command MATCHES " -fno-math-errno .*-fno-fast-math")
+    message(FATAL_ERROR "The host's options apply to the libraries: ${command}")
+  endif()
+endforeach()
 file(REMOVE_RECURSE ${work})
