@@ -97,8 +97,10 @@ class Field {
   /// (Runnalls' cost, Herholz et al. 2016, Appendix B). A record of up to four components takes about half the memory.
   Field reduced(float cost) const;
 
-  std::size_t records() const;    ///< number of records
-  std::size_t bytes() const;      ///< memory of the records and their look-up structure
+  std::size_t records() const;  ///< number of records
+  /// Memory of the records and their look-up structure. A field that can be trained takes several times as much, mainly
+  /// for FieldOptions::reservoir; frozen() leaves that out.
+  std::size_t bytes() const;
   double meanComponents() const;  ///< mean number of Gaussians per record; 0 if there are no records
   /// Fraction of the records that were trained with fewer than 5 particles per Gaussian; 0 if the field cannot be
   /// trained.
