@@ -53,6 +53,7 @@ float representableFraction(const Reflectance& reflectance) {
 }  // namespace
 
 GuidingDecision SurfaceDistribution::Impl::decide() const {
+  if (record->samples == 0) return GuidingDecision::noRecord;
   if (representable <= 0) return GuidingDecision::tooNarrow;
   if (!product) return GuidingDecision::illumination;
   if (record->samples < kUndersampled) return GuidingDecision::undersampled;
@@ -119,7 +120,9 @@ void SurfaceDistribution::describe(const SurfaceReflectance& reflectance, const 
   self.representable = (1 - undescribed) * (self.product ? representableFraction(self.reflectance) : 1);
   assert(self.representable >= 0 && self.representable <= 1);
   decision_ = self.decide();
-  if (decision_ == GuidingDecision::tooNarrow || decision_ == GuidingDecision::uniform) return;
+  if (decision_ == GuidingDecision::noRecord || decision_ == GuidingDecision::tooNarrow ||
+      decision_ == GuidingDecision::uniform)
+    return;
   const bool halves = !self.product || decision_ == GuidingDecision::undersampled;
   const StrategyProbabilities probabilities =
       halves ? kGuidedProbabilities : productProbabilities(self.record->bsdfFraction);

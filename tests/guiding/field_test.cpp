@@ -274,6 +274,32 @@ TEST_CASE("guiding: an undescribed fraction out of range counts as the nearest o
   CHECK(bsdfProbability(std::numeric_limits<float>::quiet_NaN()) == 1);
 }
 
+TEST_CASE("guiding: a record that has only seen photons without weight is not sampled") {
+  SampleStorage storage;
+  storage.beginPath(1000);
+  storage.requestRecord(floorAt(0.5f, 0.5f));
+  Rng rng(4);
+  for (std::uint64_t i = 0; i < 500; ++i) {
+    storage.beginPath(i);
+    const Float3 position{rng.uniform(), rng.uniform(), 0};
+    storage.addPhoton(position, {0, 0, 1}, {0.6f, 0, 0.8f}, 0, 3, 1);  // of a light that next-event estimation finds
+    storage.requestRecord(position, {0, 0, 1});
+  }
+  Field field(smallField());
+  field.update(storage);
+  const LobeCacheSet caches("", {}, "");
+  for (const LobeCacheSet* set : {static_cast<const LobeCacheSet*>(nullptr), &caches}) {
+    SurfaceDistribution guide(field, floorAt(0.5f, 0.5f));
+    REQUIRE(guide.hasRecord());
+    guide.describe({.lobes = {}, .diffuseAlbedo = 0.5f}, set);
+    CHECK(guide.decision() == GuidingDecision::noRecord);
+    CHECK(guide.bsdfProbability() == 1);
+    CHECK(guide.guidedPdf({0.6f, 0, 0.8f}) == 0);
+    CHECK(!guide.learnsFraction());
+    CHECK(guide.reflectedRadiance(0.5f).value() > 0);  // the irradiance is known
+  }
+}
+
 TEST_CASE("guiding: on the back of a surface, directions follow the light that arrives there") {
   // Light from below that no mirroring leaves in place. The field's frame is that of the world.
   const Vec3 light = Vec3(0.6f, 0.35f, -0.7f).normalized();

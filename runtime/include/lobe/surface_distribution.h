@@ -62,7 +62,7 @@ enum class GuidingDecision : std::uint8_t {
   undersampled,  ///< illumination and BSDF with probability ½ each: the record has seen too few particles
   tooNarrow,     ///< BSDF only: the lobes are too narrow for mixtures, or no part of the BSDF was described
   uniform,       ///< BSDF only: the incident radiance is nearly constant
-  noRecord       ///< BSDF only: no record serves the point
+  noRecord       ///< BSDF only: no record serves the point, or it has seen no particle with weight
 };
 
 /// The BSDF sampling fraction of a record for product sampling before training has learnt a better one.
