@@ -38,6 +38,10 @@ LobeCache openFor(const std::filesystem::path& folder, const LobeRequest& reques
   return cache;
 }
 
+[[noreturn]] void refuseIndex(int lobe, std::size_t requests) {
+  throw std::out_of_range(fmt::format("TintedLobe::lobe is {}, but the cache set has {} requests", lobe, requests));
+}
+
 }  // namespace
 
 BrdfCaches::Entry::Entry(LobeCache opened, float reduction)
@@ -99,8 +103,11 @@ BrdfCaches::BrdfCaches(const std::filesystem::path& folder, std::span<const Lobe
 }
 
 void BrdfCaches::add(int lobe, const Vec3& wo, const Vec2& turn, float tint, Reflectance& reflectance) const {
-  assert(lobe >= 0 && static_cast<std::size_t>(lobe) < cacheOfRequest_.size() && std::isfinite(tint));
-  const Entry& entry = caches_[cacheOfRequest_[lobe]];
+  assert(std::isfinite(tint));
+  const auto request = static_cast<std::size_t>(lobe);  // huge for negative numbers
+  if (request >= cacheOfRequest_.size()) [[unlikely]]
+    refuseIndex(lobe, cacheOfRequest_.size());
+  const Entry& entry = caches_[cacheOfRequest_[request]];
   const Mirror mirror = entry.cache.info().quarter ? Mirror::intoQuadrant(wo) : Mirror{};
   const Record& record = entry.nearest(mirror(wo));
   const bool representable = record.count > 0 && record.count <= reflectance.gaussians.room();

@@ -21,9 +21,10 @@ class BrdfCaches {
   BrdfCaches(const std::filesystem::path& folder, std::span<const LobeRequest> requests, const std::string& remedy,
              float reduction = 0);
 
-  /// Adds tint · ρ_lobe(wo, ·) to a reflectance. lobe: index of the request. wo: unit, z > 0, in the shading frame.
-  /// turn: (cos, sin) of the rotation that maps shading-frame coordinates to the frame of the reflectance. A lobe whose
-  /// record has no components, or for whose components there is no room, is counted in unrepresentableAlbedo instead.
+  /// Adds tint · ρ_lobe(wo, ·) to a reflectance. lobe: index of the request; throws std::out_of_range if there is none.
+  /// wo: unit, z > 0, in the shading frame. turn: (cos, sin) of the rotation that maps shading-frame coordinates to the
+  /// frame of the reflectance. A lobe whose record has no components, or for whose components there is no room, is
+  /// counted in unrepresentableAlbedo instead.
   void add(int lobe, const Vec3& wo, const Vec2& turn, float tint, Reflectance& reflectance) const;
 
   std::size_t files() const { return caches_.size(); }

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 #include <span>
+#include <stdexcept>
 #include <vector>
 
 #include <tbb/global_control.h>
@@ -297,6 +298,16 @@ TEST_CASE("guiding: a record that has only seen photons without weight is not sa
     CHECK(guide.guidedPdf({0.6f, 0, 0.8f}) == 0);
     CHECK(!guide.learnsFraction());
     CHECK(guide.reflectedRadiance(0.5f).value() > 0);  // the irradiance is known
+  }
+}
+
+TEST_CASE("guiding: a lobe that the cache set does not have is refused") {
+  const Field field = trained();
+  const LobeCacheSet caches("", {}, "");
+  for (const int lobe : {0, -1}) {
+    SurfaceDistribution guide(field, floorAt(0.5f, 0.5f));
+    const TintedLobe tinted{lobe, 0.5f};
+    CHECK_THROWS_AS(guide.describe({.lobes = {&tinted, 1}, .diffuseAlbedo = 0.5f}, &caches), std::out_of_range);
   }
 }
 

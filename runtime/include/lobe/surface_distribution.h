@@ -112,7 +112,8 @@ class SurfaceDistribution {
 
   /// Sets the reflectance and prepares sampling. Must be called exactly once if hasRecord(), and not otherwise.
   /// `caches` is the cache set that the lobes' indices refer to; nullptr disables the product, so that directions are
-  /// sampled from illumination and BSDF with probability ½ each (Vorba et al. 2014). Neither argument is kept.
+  /// sampled from illumination and BSDF with probability ½ each (Vorba et al. 2014). Neither argument is kept. Throws
+  /// std::out_of_range if the set has no lobe of such an index.
   void describe(const SurfaceReflectance& reflectance, const LobeCacheSet* caches);
 
   GuidingDecision decision() const { return decision_; }
