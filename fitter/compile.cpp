@@ -232,15 +232,22 @@ int workOf(const CompileJob& job) {
   return job.info.settings.fixedGrid ? job.grid.count : adaptiveDirections(*job.use.lobe, job.grid);
 }
 
-void runCompile(const CompileJob& job, const std::function<void()>& advance) {
+FittedGrid fitForFile(const CompileJob& job, const std::function<void()>& advance) {
   makeFolder(job.path.parent_path());
   checkWritable(job.path);
-  const FittedGrid fit = fitGrid(*job.use.lobe, job.grid, job.info.settings, advance);
+  return fitGrid(*job.use.lobe, job.grid, job.info.settings, advance);
+}
+
+void writeCompiled(const CompileJob& job, const FittedGrid& fit) {
   LobeCacheInfo info = job.info;
   info.quarter = fit.quarter;
   const std::vector<std::byte> bytes =
       nameErrors(job.path, [&] { return encodeLobeCache(info, fit.records, fit.components, fit.lookup); });
   writeAtomically(job.path, std::span<const std::byte>(bytes));
+}
+
+void runCompile(const CompileJob& job, const std::function<void()>& advance) {
+  writeCompiled(job, fitForFile(job, advance));
 }
 
 }  // namespace lobe

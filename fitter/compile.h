@@ -54,6 +54,10 @@ int workOf(const CompileJob& job);
 /// Throws std::runtime_error.
 void runCompile(const CompileJob& job, const std::function<void()>& advance);
 
+/// The two halves of runCompile: fits the records, after it has made sure that the file can be written, and writes it.
+FittedGrid fitForFile(const CompileJob& job, const std::function<void()>& advance);
+void writeCompiled(const CompileJob& job, const FittedGrid& fit);
+
 /// Fits a lobe over a grid, as runCompile does. A lobe that reflects nothing from any direction gets one record without
 /// Gaussians. Throws std::runtime_error like fitLobe.
 FittedGrid fitGrid(const Lobe& lobe, const DirectionGrid& grid, const FitSettings& settings,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <span>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -66,6 +67,14 @@ void validate(const LobeFunctions& lobe) {
     throw std::runtime_error("LobeFunctions: evaluate, sample and pdf must all be set");
 }
 
+/// Refuses a lobe without records of positive integral although it reflects light.
+void checkSampled(const LobeFunctions& lobe, std::span<const CacheRecord> records) {
+  const bool black = std::ranges::none_of(records, [](const CacheRecord& r) { return r.integral > 0; });
+  if (black && lobe.evaluate({0, 0, 1}, {0, 0, 1}) > 0)
+    throw std::runtime_error(
+        fmt::format("lobe {}: sample draws no direction although evaluate is positive", lobe.model));
+}
+
 }  // namespace
 
 void FittingOptions::validate() const {
@@ -86,14 +95,14 @@ CompiledLobe compileLobe(const LobeFunctions& lobe, const FittingOptions& option
   compile.settings.quality = options.quality;
   compile.settings.components = static_cast<std::uint32_t>(options.components);
   const CompileJob job = planCompile({{std::make_shared<HostLobe>(lobe), {}}}, compile).front();
-  if (!job.upToDate) runCompile(job, {});
+  if (!job.upToDate) {
+    const FittedGrid fit = fitForFile(job, {});
+    checkSampled(lobe, fit.records);
+    writeCompiled(job, fit);
+  }
   const LobeCache cache = LobeCache::open(job.path);
   float worst = 0;
   for (const CacheRecord& r : cache.records()) worst = std::max({worst, r.nev, r.nevCoverage});
-  const bool black = std::ranges::none_of(cache.records(), [](const CacheRecord& r) { return r.integral > 0; });
-  if (black && lobe.evaluate({0, 0, 1}, {0, 0, 1}) > 0)
-    throw std::runtime_error(
-        fmt::format("lobe {}: sample draws no direction although evaluate is positive", lobe.model));
   return {job.path, !job.upToDate, cache.records().size(), worst};
 }
 

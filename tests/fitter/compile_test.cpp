@@ -10,6 +10,7 @@
 #include <CLI/CLI.hpp>
 
 #include "fitter/compile.h"
+#include "lobe/fitting.h"
 #include "runtime/core/atomic_file.h"
 #include "runtime/core/parallel.h"
 #include "runtime/tools/cache_report.h"
@@ -100,6 +101,23 @@ TEST_CASE("fitter: cache files do not depend on the number of threads") {
   }
   CHECK(contents[0] == contents[1]);
   CHECK(contents[0][0].size() > 500);
+}
+
+TEST_CASE("fitter: no file is written for a lobe whose sampler draws nothing") {
+  const Folder folder;
+  LobeFunctions lobe;
+  lobe.model = "unsampled";
+  lobe.key = "unsampled lobe";
+  lobe.evaluate = [](const Float3&, const Float3&) { return 0.3; };
+  lobe.sample = [](const Float3&, const Float2&) { return std::optional<LobeDirection>(); };
+  lobe.pdf = [](const Float3&, const Float3&) { return 0.0f; };
+  FittingOptions options;
+  options.folder = folder / "caches";
+  CHECK_THROWS_WITH(compileLobe(lobe, options), Catch::Contains("draws no direction"));
+  CHECK(fs::is_empty(options.folder));
+  lobe.evaluate = [](const Float3&, const Float3&) { return 0.0; };  // black
+  CHECK(compileLobe(lobe, options).fitted);
+  CHECK(!compileLobe(lobe, options).fitted);
 }
 
 TEST_CASE("fitter: the summary of a cache agrees with its records") {

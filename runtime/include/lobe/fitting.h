@@ -67,8 +67,8 @@ struct CompiledLobe {
 /// Fits the lobe in parallel (TBB) and writes its cache file atomically; does nothing if the file is up to date. The
 /// bytes of the file do not depend on the number of threads. The records of a lobe that reflects nothing or is too
 /// narrow for Gaussians have no components; guiding then leaves the lobe to BSDF sampling. Throws std::runtime_error
-/// that names the lobe, field or file if a field or option is invalid, if a function returns a value out of range, or
-/// if the file cannot be written.
+/// that names the lobe, field or file if a field or option is invalid, if a function returns a value out of range, if
+/// `sample` draws nothing although `evaluate` is positive, or if the file cannot be written; no file is written then.
 CompiledLobe compileLobe(const LobeFunctions& lobe, const FittingOptions& options = {});
 
 }  // namespace lobe
