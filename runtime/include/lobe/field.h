@@ -75,9 +75,10 @@ class Field {
   /// (SampleStorage::beginPath), not on threads. Samples of the BSDF sampling fraction must have been recorded with
   /// this field or a copy of it.
   ///
-  /// Returns the log-likelihood of the particles near a record under its mixture before the update, in nats, averaged
-  /// over the records: a measure on data that was not trained on. nullopt if no record had particles near it. Throws
-  /// std::logic_error if the field cannot be trained (it was default-constructed, loaded, frozen or reduced).
+  /// Returns the log-likelihood of the particles near a record under its mixture before the update, in nats, of the
+  /// density over the area of the disc, averaged over the records: a measure on data that was not trained on. nullopt
+  /// if no record had particles near it. Throws std::logic_error if the field cannot be trained (it was
+  /// default-constructed, loaded, frozen or reduced).
   std::optional<double> update(const SampleStorage& storage);
 
   /// Fits every record once more to a sample of the particles of all passes that were near it, which corrects what the

@@ -69,6 +69,7 @@ struct CompiledLobe {
 /// narrow for Gaussians have no components; guiding then leaves the lobe to BSDF sampling. Throws std::runtime_error
 /// that names the lobe, field or file if a field or option is invalid, if a function returns a value out of range, if
 /// `sample` draws nothing although `evaluate` is positive, or if the file cannot be written; no file is written then.
+/// Exceptions of the functions are thrown again.
 CompiledLobe compileLobe(const LobeFunctions& lobe, const FittingOptions& options = {});
 
 }  // namespace lobe

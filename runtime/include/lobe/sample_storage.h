@@ -27,7 +27,8 @@ class SampleStorage {
   /// must be unique among all storages that are merged.
   void beginPath(std::uint64_t index);
 
-  /// Adds a photon that arrived at a surface, in world space.
+  /// Adds a photon that arrived at a surface, in world space. Drops it if a vector is not finite, or if weight or
+  /// flux is negative or not finite.
   ///
   /// normal: unit geometric normal on the side where the photon arrived.
   /// direction: unit, from the surface to where the photon came from.

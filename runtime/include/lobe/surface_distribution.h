@@ -49,7 +49,7 @@ struct TintedLobe {
 /// The non-delta reflection of the BSDF at this point for wo, as far as mixtures represent it.
 struct SurfaceReflectance {
   std::span<const TintedLobe> lobes;
-  float diffuseAlbedo = 0;  ///< albedo (luminance) of the part with constant BRDF value, albedo / π
+  float diffuseAlbedo = 0;  ///< albedo (luminance), ≥ 0, of the part with constant BRDF value, albedo / π
   /// Fraction of the non-delta albedo that is in neither of the above: transmission and lobes without a cache. Values
   /// below 0 count as 0; values above 1, and NaN, as 1.
   float undescribedFraction = 0;
@@ -91,7 +91,7 @@ inline Strategy chooseStrategy(float& choice, float bsdfProbability, float produ
 
 /// A direction drawn from the illumination or the product.
 struct GuidedSample {
-  Float3 wi;        ///< unit, in the shading frame
+  Float3 wi;        ///< unit, in the shading frame, on the side of wo; may be below the geometric surface
   float guidedPdf;  ///< SurfaceDistribution::guidedPdf(wi)
 };
 
@@ -112,8 +112,9 @@ class SurfaceDistribution {
 
   /// Sets the reflectance and prepares sampling. Must be called exactly once if hasRecord(), and not otherwise.
   /// `caches` is the cache set that the lobes' indices refer to; nullptr disables the product, so that directions are
-  /// sampled from illumination and BSDF with probability ½ each (Vorba et al. 2014). Neither argument is kept. Throws
-  /// std::out_of_range if the set has no lobe of such an index.
+  /// sampled from illumination and BSDF with probability ½ each (Vorba et al. 2014); if undescribedFraction > 0, only
+  /// the remaining fraction is, and the undescribed one by the BSDF. Neither argument is kept. Throws std::out_of_range
+  /// if the set has no lobe of such an index.
   void describe(const SurfaceReflectance& reflectance, const LobeCacheSet* caches);
 
   GuidingDecision decision() const { return decision_; }
