@@ -36,7 +36,7 @@ constexpr double kTooNarrow = 0.004;
 constexpr std::uint32_t kTooNarrowRecords = 8;
 
 double secondMoment(const FittedRecord& fitted) {
-  return 1.0 + fitted.worse();
+  return 1.0 + fitted.largerVariance();
 }
 
 /// The standard deviation of the lobe along its narrower axis, at normal incidence.
@@ -91,7 +91,7 @@ class DirectionFits {
     if (lobe.kind() != LobeKind::isotropic) return;
     most_ = byWeightedEm(settings.components);
     const float factor = std::max(1.0f, settings.quality / kDefaultQuality);
-    settings_.quality = std::min(settings.quality, factor * most_->worse());
+    settings_.quality = std::min(settings.quality, factor * most_->largerVariance());
   }
 
   double target() const { return settings_.quality; }
@@ -219,7 +219,7 @@ class AdaptiveFitter {
     Mixture aligned(neighbour.mixture.size());
     alignMixture({grid_.kind, references_[found], {}}, neighbour.mixture, wo, aligned);
     const Quality served = gradeMixture(lobe_, wo, aligned, settings_.samples / kDecisionFraction);
-    const double moment = 1 + served.worse();
+    const double moment = 1 + served.largerVariance();
     // A look-up may be worse than a fit for this direction by the same factor as a fit may be worse than the lobe.
     if (moment <= (1 + targets_[found]) * secondMoment(neighbour)) return std::nullopt;
     const DirectionFits fits(lobe_, wo, settings_);

@@ -12,7 +12,7 @@ namespace lobe {
 /// Default quality target, a relative variance (NEV); chosen from measurements of quality against time and size.
 inline constexpr float kDefaultQuality = 0.03f;
 
-/// Fits the lobe so that the relative variance (Quality::worse) of every record is at most a target where
+/// Fits the lobe so that the relative variance (Quality::largerVariance) of every record is at most a target where
 /// settings.components Gaussians can reach it, and close to the lowest that they can reach elsewhere. The target is
 /// settings.quality. For isotropic lobes it is lowered to the relative variance of weighted EM with
 /// settings.components Gaussians, times max(1, quality / kDefaultQuality), if that is less. With the default quality,

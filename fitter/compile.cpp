@@ -124,7 +124,7 @@ FittedRecord notAboveWeightedEm(const DirectionFitter& fitter, const FitSettings
   FitSettings wem = settings;
   wem.method = FitMethod::wem;
   const FittedRecord reached = fitter.fit(wem);
-  return found.worse() <= reached.worse() ? found : fitter.fit(settings, reached.mixture);
+  return found.largerVariance() <= reached.largerVariance() ? found : fitter.fit(settings, reached.mixture);
 }
 
 /// A record of a chain and the direction it was fitted for.
@@ -140,7 +140,7 @@ FittedRecord fitFromNeighbour(const DirectionFitter& fitter, const Vec3& wo, Gri
   FittedRecord record = fitter.fit(settings, start);
   if (record.record.nevCoverage <= kWorseByFactor * neighbour.fitted.record.nevCoverage + kWorseBy) return record;
   FittedRecord fresh = fitter.fit(settings);
-  return fresh.worse() < record.worse() ? fresh : record;
+  return fresh.largerVariance() < record.largerVariance() ? fresh : record;
 }
 
 FittedRecord fitOfChain(const Lobe& lobe, const Vec3& wo, GridKind kind, const std::optional<Neighbour>& neighbour,

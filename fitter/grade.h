@@ -17,8 +17,8 @@ inline constexpr double kGradedBsdfFraction = 0.1;
 /// where q is the density of the lobe's own sampler. Samples that the sampler rejects count as f = 0. All values are 0
 /// where nothing is reflected.
 struct Quality {
-  /// The value by which fits are compared: each of the two estimates may miss regions that its points do not sample.
-  double worse() const { return std::max(nev, coverage); }
+  /// The larger of the two estimates, by which fits are compared: each may miss regions that its points do not sample.
+  double largerVariance() const { return std::max(nev, coverage); }
 
   double nev;       ///< estimated with points drawn from p
   double coverage;  ///< the same quantity estimated with points from q, which also sample what the mixture misses

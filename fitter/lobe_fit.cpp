@@ -116,9 +116,9 @@ DirectionFitter::Graded DirectionFitter::refined(const Mixture& start, const Fit
   normalise(mixture);
   Graded after = graded(std::move(mixture));
   // The coverage is a lower bound of the start's grade and is cheap to compute.
-  if (after.quality.worse() < grader_.coverage(start)) return after;
+  if (after.quality.largerVariance() < grader_.coverage(start)) return after;
   Graded before = graded(start);
-  return after.quality.worse() < before.quality.worse() ? after : before;
+  return after.quality.largerVariance() < before.quality.largerVariance() ? after : before;
 }
 
 FittedRecord DirectionFitter::record(Graded best) const {

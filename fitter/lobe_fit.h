@@ -22,8 +22,8 @@ inline constexpr std::uint32_t kFitRevision = 4;
 struct FittedRecord {
   Mixture mixture;     ///< weights sum to one
   CacheRecord record;  ///< first is 0, count is mixture.size()
-  /// See Quality::worse.
-  float worse() const { return std::max(record.nev, record.nevCoverage); }
+  /// See Quality::largerVariance.
+  float largerVariance() const { return std::max(record.nev, record.nevCoverage); }
 };
 
 /// Fits mixtures for one direction, reusing the samples of the lobe. Keeps a reference to the lobe.
@@ -51,8 +51,8 @@ class DirectionFitter {
 /// Fits the lobe for wo (unit, z > 0). Deterministic. Where nothing is reflected, the record has integral and albedo 0
 /// and one broad component. Least squares starts from weighted EM, or from `start` if it is not empty (the mixture of a
 /// neighbouring direction, aligned with wo), whose components keep their order and number. The result of least squares
-/// is kept only if its grade (Quality::worse) is better than that of the start. Throws std::runtime_error if the lobe
-/// returns numbers that are not finite or is too narrow.
+/// is kept only if its grade (Quality::largerVariance) is better than that of the start. Throws std::runtime_error if
+/// the lobe returns numbers that are not finite or is too narrow.
 FittedRecord fitLobe(const Lobe& lobe, const Vec3& wo, const FitSettings& settings,
                      std::span<const Gaussian> start = {});
 

@@ -63,7 +63,7 @@ std::optional<double> servedNev(const Lobe& lobe, const DirectionGrid& grid, con
   std::array<Gaussian, kMaxCacheComponents> room;
   const std::span<const Gaussian> mixture = fit.mixtureFor(grid, wo, room);
   if (mixture.empty()) return std::nullopt;
-  return gradeMixture(lobe, wo, mixture, kGradeSamples).worse();
+  return gradeMixture(lobe, wo, mixture, kGradeSamples).largerVariance();
 }
 
 /// Relative variances of fits for the directions themselves, by the most accurate method and with the maximum number of
@@ -74,7 +74,7 @@ std::vector<double> ownNevs(const Lobe& lobe, const CompileOptions& options) {
   std::vector<double> nevs;
   for (int i = 0; i < kDirections; ++i) {
     const Vec3 wo = queryDirection(i);
-    nevs.push_back(gradeMixture(lobe, wo, fitLobe(lobe, wo, settings).mixture, kGradeSamples).worse());
+    nevs.push_back(gradeMixture(lobe, wo, fitLobe(lobe, wo, settings).mixture, kGradeSamples).largerVariance());
   }
   return nevs;
 }
@@ -148,7 +148,7 @@ nlohmann::ordered_json measureBetween(const char* distribution, const std::strin
   std::vector<double> nevs, ratios;
   for (int i = 0; i < kDirections; ++i) {
     const Vec3 wo = queryDirection(i);
-    nevs.push_back(gradeMixture(*lobe, wo, betweenLevels(a, b, wo), kGradeSamples).worse());
+    nevs.push_back(gradeMixture(*lobe, wo, betweenLevels(a, b, wo), kGradeSamples).largerVariance());
     ratios.push_back((1 + nevs.back()) / (1 + own[static_cast<std::size_t>(i)]));
   }
   nlohmann::ordered_json row{{"lobe", fmt::format("{} {:.3f}", distribution, alpha)}, {"way", way}};

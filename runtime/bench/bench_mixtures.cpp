@@ -122,7 +122,8 @@ Json alignment(const std::vector<int>& counts) {
         const std::array<Vec3, 2> queries{wo, fitted.recordDirection(wo)};
         for (std::size_t k = 0; k < queries.size(); ++k)
           nevs[k].push_back(
-              gradeMixture(*lobe, wo, fitted.fit.mixtureFor(fitted.job.grid, queries[k], room), kGradeSamples).worse());
+              gradeMixture(*lobe, wo, fitted.fit.mixtureFor(fitted.job.grid, queries[k], room), kGradeSamples)
+                  .largerVariance());
       }
       rows.push_back({{"surface", surface.name},
                       {"records", count},

@@ -69,8 +69,8 @@ TEST_CASE("fitter: with default settings records are as good as weighted EM with
       CAPTURE(distribution, alpha, elevation);
       const FittedRecord fewest = fitWithFewest(*lobe, direction(elevation), settings);
       // More Gaussians are used only if they gain at least a quarter of the target.
-      CHECK(fewest.worse() <= 1.25f * fitLobe(*lobe, direction(elevation), wem).worse());
-      CHECK(fewest.worse() <= 1.25f * settings.quality);
+      CHECK(fewest.largerVariance() <= 1.25f * fitLobe(*lobe, direction(elevation), wem).largerVariance());
+      CHECK(fewest.largerVariance() <= 1.25f * settings.quality);
       components += fewest.mixture.size(), ++records;
     }
   }
