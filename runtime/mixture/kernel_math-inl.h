@@ -1,9 +1,9 @@
 // Vectorised functions shared by the kernels. Included once per instruction set, hence no #pragma once.
-#if defined(LOBE_LANE_MATH_INL_H) == defined(HWY_TARGET_TOGGLE)
-#ifdef LOBE_LANE_MATH_INL_H
-#undef LOBE_LANE_MATH_INL_H
+#if defined(LOBE_KERNEL_MATH_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef LOBE_KERNEL_MATH_INL_H
+#undef LOBE_KERNEL_MATH_INL_H
 #else
-#define LOBE_LANE_MATH_INL_H
+#define LOBE_KERNEL_MATH_INL_H
 #endif
 
 #include <hwy/highway.h>
