@@ -21,7 +21,7 @@ TrainingOptions trainingOptions(const FieldOptions& options) {
   training.neighbours = options.neighbours;
   training.reservoir = options.reservoir;
   training.unitFraction = options.unitFraction;
-  training.klThreshold = options.klThreshold;
+  training.maxParallax = options.maxParallax;
   return training;
 }
 

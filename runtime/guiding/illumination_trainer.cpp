@@ -41,7 +41,7 @@ void TrainingOptions::validate() const {
   require(neighbours >= 1, "neighbours", "at least 1");
   require(reservoir >= 0, "reservoir", "at least 0");
   require(unitFraction > 0 && unitFraction <= 1, "unitFraction", "in (0, 1]");
-  require(klThreshold > 0, "klThreshold", "positive");
+  require(maxParallax > 0, "maxParallax", "positive");
 }
 
 IlluminationTrainer::IlluminationTrainer(const TrainingOptions& options, float sceneDiagonal,
@@ -178,7 +178,7 @@ void IlluminationTrainer::shrinkRadius(Training& record) const {
   for (const Gaussian& g : record.em.gaussians()) {
     const double half = 0.5 * (g.cov.xx + g.cov.yy);
     const double smallest = half - std::sqrt(std::max(0.0, half * half - g.cov.determinant()));
-    const double cosine = std::clamp(1.0 - options_.klThreshold * std::sqrt(std::max(0.0, smallest)), 0.01, 0.99999);
+    const double cosine = std::clamp(1.0 - options_.maxParallax * std::sqrt(std::max(0.0, smallest)), 0.01, 0.99999);
     inverse += g.weight * cosine / std::sqrt(1.0 - cosine * cosine);
   }
   const auto parallax = static_cast<float>(record.distance / inverse);

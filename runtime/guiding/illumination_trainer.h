@@ -19,7 +19,7 @@ struct TrainingOptions {
   int neighbours = 250;        ///< largest number of particles of each source per record and pass, ≥ 1
   float unitFraction = 0.02f;  ///< the largest radius ("unit"), as a fraction of sceneDiagonal, in (0, 1]
   int reservoir = 500;         ///< largest number of points that each record keeps for refit, ≥ 0
-  float klThreshold = 5.0f;    ///< κ: largest parallax within a record's radius, in standard deviations, > 0
+  float maxParallax = 5.0f;    ///< κ: largest parallax within a record's radius, in standard deviations, > 0
 
   /// Throws std::runtime_error that names the first field that is out of range.
   void validate() const;

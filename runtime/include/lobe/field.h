@@ -26,7 +26,7 @@ struct FieldOptions {
   float unitFraction = 0.02f;  ///< largest radius of a record, as a fraction of sceneDiagonal, in (0, 1]
   /// Largest parallax within the radius of a record, in standard deviations of a component, > 0. Smaller values give
   /// smaller radii and more records.
-  float klThreshold = 5.0f;
+  float maxParallax = 5.0f;
 
   /// Throws std::runtime_error that names the first field that is out of range.
   void validate() const;
