@@ -40,7 +40,7 @@ std::optional<Vec3> GuidedDensity::sample(Strategy strategy, float choice, const
   if (strategy == Strategy::product) {
     y = product_->sample(choice, u);
   } else {
-    if (detail::takePart(choice, illumination_.background)) return sampleCosine(u);
+    if (detail::chooseFirst(choice, illumination_.background)) return sampleCosine(u);
     y = sampleGaussians(illumination_.gaussians(), choice, u);
   }
   if (!insideDisc(y)) return std::nullopt;

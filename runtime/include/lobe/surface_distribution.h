@@ -73,8 +73,9 @@ enum class Strategy : std::uint8_t { bsdf, product, illumination };
 
 namespace detail {
 
-/// Whether choice, uniform in [0,1), is less than the probability. Rescales choice to be uniform in [0,1) again.
-inline bool takePart(float& choice, float probability) {
+/// Chooses the first of two alternatives with the given probability: returns whether choice, uniform in [0,1), is less.
+/// Rescales choice to be uniform in [0,1) again.
+inline bool chooseFirst(float& choice, float probability) {
   constexpr float kOneMinusEpsilon = 0x1.fffffep-1f;
   const bool first = choice < probability;
   const float mapped = first ? choice / probability : probability < 1 ? (choice - probability) / (1 - probability) : 0;
@@ -83,8 +84,8 @@ inline bool takePart(float& choice, float probability) {
 }
 
 inline Strategy chooseStrategy(float& choice, float bsdfProbability, float productOfGuided) {
-  if (takePart(choice, bsdfProbability)) return Strategy::bsdf;
-  return takePart(choice, productOfGuided) ? Strategy::product : Strategy::illumination;
+  if (chooseFirst(choice, bsdfProbability)) return Strategy::bsdf;
+  return chooseFirst(choice, productOfGuided) ? Strategy::product : Strategy::illumination;
 }
 
 }  // namespace detail
