@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <exception>
+#include <limits>
 #include <list>
 #include <new>
 #include <stdexcept>
@@ -65,7 +66,12 @@ Imf::Header makeHeader(const Image& image, const ImageAttributes& attributes, co
   return header;
 }
 
-/// The channels of a file, and the conversion to halves.
+/// Whether DWA compression takes all channels with these last letters for colours.
+bool isColour(const std::string& components) {
+  return components.find_first_not_of("RGBY") == std::string::npos;
+}
+
+/// The channels of a file, and the conversion to what the format can store.
 class Channels {
  public:
   Channels(Imf::Header& header, const ExrFormat& format) : header_(header), format_(format) {}
@@ -73,7 +79,7 @@ class Channels {
   /// Adds the channels prefix + c for all components c.
   void add(const std::string& prefix, const std::string& components, const Image& image, bool precise) {
     const bool halves = format_.type == ExrFormat::Type::halves && !precise;
-    const char* base = halves ? toHalves(image) : reinterpret_cast<const char*>(image.pixels.data());
+    const char* base = halves ? toHalves(image, limitOf(components, halves)) : toFloats(image, components);
     const std::size_t size = halves ? sizeof(Imath::half) : sizeof(float), stride = 3 * size;
     const Imf::PixelType type = halves ? Imf::HALF : Imf::FLOAT;
     for (std::size_t c = 0; c < components.size(); ++c) {
@@ -87,24 +93,39 @@ class Channels {
   std::size_t clamped() const { return clamped_; }
 
  private:
-  const char* toHalves(const Image& image) {
+  float limitOf(const std::string& components, bool halves) const {
+    if (format_.isLossy() && isColour(components)) return kLargestDwa;
+    return halves ? kLargestHalf : std::numeric_limits<float>::infinity();
+  }
+
+  const char* toHalves(const Image& image, float limit) {
     std::vector<Imath::half>& values = halves_.emplace_back();
     values.reserve(3 * image.pixels.size());
     for (const Rgb& pixel : image.pixels)
-      for (const float value : pixel) values.push_back(toHalf(value));
+      for (const float value : pixel) values.emplace_back(clamped(value, limit));
     return reinterpret_cast<const char*>(values.data());
   }
 
-  Imath::half toHalf(float value) {
-    if (!std::isfinite(value) || std::abs(value) <= kLargestHalf) return value;
+  const char* toFloats(const Image& image, const std::string& components) {
+    const float limit = limitOf(components, false);
+    if (std::isinf(limit)) return reinterpret_cast<const char*>(image.pixels.data());
+    Image& values = floats_.emplace_back(image);
+    for (Rgb& pixel : values.pixels)
+      for (float& value : pixel) value = clamped(value, limit);
+    return reinterpret_cast<const char*>(values.pixels.data());
+  }
+
+  float clamped(float value, float limit) {
+    if (!std::isfinite(value) || std::abs(value) <= limit) return value;
     ++clamped_;
-    return std::copysign(kLargestHalf, value);
+    return std::copysign(limit, value);
   }
 
   Imf::Header& header_;
   const ExrFormat& format_;
   Imf::FrameBuffer frame_;
   std::list<std::vector<Imath::half>> halves_;
+  std::list<Image> floats_;
   std::size_t clamped_ = 0;
 };
 

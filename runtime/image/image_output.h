@@ -21,10 +21,17 @@ using ImageAttributes = std::map<std::string, std::variant<std::string, double>>
 struct ExrFormat {
   enum class Type { floats, halves } type = Type::floats;
   enum class Compression { none, rle, zips, zip, piz, dwaa, dwab } compression = Compression::zip;
+
+  /// Whether colours are only approximate: DWA compression changes channels whose names end in R, G, B or Y.
+  bool isLossy() const { return compression == Compression::dwaa || compression == Compression::dwab; }
 };
 
 /// The most and the least that the type half can store.
 inline constexpr float kLargestHalf = 65504.0f;
+
+/// The most and the least that is stored in colours with DWA compression, which converts them to halves, also if the
+/// type is float. Beside dark pixels decoded values may be larger, by 3 % in our tests; halves must still hold them.
+inline constexpr float kLargestDwa = 0.5f * kLargestHalf;
 
 /// Channels of an .exr file besides the colours: `name.R`, `name.G` and `name.B`, for example. All channels of a file
 /// have the same size.
@@ -43,8 +50,9 @@ void checkImageName(const std::filesystem::path& path);
 bool isExrName(const std::filesystem::path& path);
 
 /// Writes the file atomically. .exr: floating-point RGB and the layers, with the attributes; .png: 8-bit sRGB, clipped
-/// to [0, 1], without attributes and layers. Returns the number of finite values that are too large for the type half
-/// and were replaced by the nearest half. Throws std::runtime_error that names the file.
+/// to [0, 1], without attributes and layers. Returns the number of finite values that are too large for the format
+/// and were replaced by kLargestHalf or, with DWA compression, kLargestDwa, or the negative of it. Throws
+/// std::runtime_error that names the file.
 std::size_t writeImage(const std::filesystem::path& path, const Image& image, const ImageAttributes& attributes = {},
                        std::span<const ImageLayer> layers = {}, const ExrFormat& format = {});
 

@@ -18,7 +18,8 @@ namespace lobe {
 /// Declares --exr-type and --exr-compression. Returns both.
 std::vector<CLI::Option*> addExrOptions(CLI::App& app, ExrFormat& format);
 
-/// Prints a note if values were too large for the type half.
-void noteClamped(const std::string& tool, const std::filesystem::path& path, std::size_t clamped);
+/// Prints a note if values were too large for the format.
+void noteClamped(const std::string& tool, const std::filesystem::path& path, std::size_t clamped,
+                 const ExrFormat& format);
 
 }  // namespace lobe

@@ -287,7 +287,7 @@ void merge(const Arguments& arguments) {
   errors.attempt(arguments.merge, [&] {
     const std::size_t clamped =
         lobe::writeImage(arguments.merge, merged.image, merged.attributes, lobe::layersOf(merged.aovs), arguments.exr);
-    lobe::noteClamped("lobecompare", arguments.merge, clamped);
+    lobe::noteClamped("lobecompare", arguments.merge, clamped, arguments.exr);
   });
   errors.throwIfAny();
 }

@@ -357,7 +357,7 @@ void Run::writePicture(const std::filesystem::path& output, const RunResult& res
   Aovs aovs;
   for (const Aov aov : job_.aovs)
     if (features_ || !isFeature(aov)) aovs.emplace(aov, imageOf(aov));
-  noteClamped(kTool, output, writeImage(output, written.image, all, layersOf(aovs), job_.exr));
+  noteClamped(kTool, output, writeImage(output, written.image, all, layersOf(aovs), job_.exr), job_.exr);
 }
 
 void Run::writeCheckpoint(OutputErrors& errors) {

@@ -9,6 +9,7 @@
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
 
+#include "runtime/core/random.h"
 #include "runtime/image/error_map.h"
 #include "runtime/image/error_metrics.h"
 #include "runtime/image/image_output.h"
@@ -212,6 +213,37 @@ TEST_CASE("render: values that are too large for halves are clamped and counted"
   CHECK((readImage(path).at(1, 0) == kLargestHalf).all());
   CHECK(writeImage(path, image) == 0);
   CHECK(readImage(path).at(1, 0).z() == 1e30f);
+}
+
+TEST_CASE("render: DWA compression keeps the brightest colours finite, and what is clamped is counted") {
+  using Compression = ExrFormat::Compression;
+  const Folder folder;
+  const std::filesystem::path path = folder / "a.exr";
+  constexpr float kBright = 1e6f;
+  Image single(16, 16), random(64, 64);
+  single.at(3, 4) = grey(kBright);
+  Rng rng(1);
+  std::size_t bright = 0;
+  for (Rgb& pixel : random.pixels)
+    for (float& value : pixel)
+      if (rng.uniformDouble() < 0.5) value = kBright, ++bright;
+  for (const Compression compression : {Compression::dwaa, Compression::dwab})
+    for (const auto type : {ExrFormat::Type::floats, ExrFormat::Type::halves})
+      for (const auto& [image, clamped] : {std::pair(single, std::size_t{3}), std::pair(random, bright)}) {
+        CAPTURE(compression == Compression::dwaa, type == ExrFormat::Type::floats, clamped);
+        const std::vector<ImageLayer> layers{{"albedo", "RGB", image},
+                                             {"depth", "Z", Image(image.width, image.height, grey(1e6f)), true}};
+        CHECK(writeImage(path, image, {}, layers, {type, compression}) == 2 * clamped);
+        const Image back = readImage(path), depth = *readChannels(path, {"depth.Z", "depth.Z", "depth.Z"});
+        float largest = 0;
+        for (std::size_t i = 0; i < back.pixels.size(); ++i) {
+          CHECK(back.pixels[i].allFinite());
+          CHECK(back.pixels[i].minCoeff() > -0.01f);
+          largest = std::max(largest, back.pixels[i].maxCoeff());
+          CHECK(depth.pixels[i].x() == 1e6f);
+        }
+        CHECK(largest == Approx(kLargestDwa).epsilon(0.1));
+      }
 }
 
 TEST_CASE("render: channels of exr files are read by name, if there are all of them") {

@@ -165,4 +165,10 @@ TEST_CASE("render: lobecompare --merge writes halves") {
                     "65504\n",
                     merged));
   CHECK(readImage(merged).at(0, 0).x() == kLargestHalf);
+  const ToolRun lossy = lobecompare("--merge " + merged + " --exr-compression dwab " + a + " " + b);
+  CHECK(lossy.code == 0);
+  CHECK(lossy.error ==
+        fmt::format("lobecompare: note: {}: 12 values are too large for --exr-compression dwab, and are stored as "
+                    "32752\n",
+                    merged));
 }
