@@ -3,10 +3,11 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <set>
 #include <string>
 #include <vector>
 
-#include "runtime/image/image_output.h"
+#include "runtime/image/aov.h"
 
 namespace CLI {  // NOLINT(readability-identifier-naming)
 class App;
@@ -17,6 +18,9 @@ namespace lobe {
 
 /// Declares --exr-type and --exr-compression. Returns both.
 std::vector<CLI::Option*> addExrOptions(CLI::App& app, ExrFormat& format);
+
+/// Throws UsageError if the AOVs contain numbers that the compression would take for colours, and change.
+void checkLossless(const ExrFormat& format, const std::set<Aov>& aovs);
 
 /// Prints a note if values were too large for the format.
 void noteClamped(const std::string& tool, const std::filesystem::path& path, std::size_t clamped,

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -280,6 +281,9 @@ lobe::Image readReference(const Arguments& arguments) {
 
 void merge(const Arguments& arguments) {
   const lobe::MergedImage merged = lobe::mergeImages(all(arguments));
+  std::set<lobe::Aov> aovs;
+  for (const auto& [aov, image] : merged.aovs) aovs.insert(aov);
+  lobe::checkLossless(arguments.exr, aovs);
   lobe::OutputErrors errors;
   if (!arguments.variance.empty())
     errors.attempt(arguments.variance,

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "runtime/image/image_output.h"
+#include "runtime/tools/exr_options.h"
 #include "runtime/tools/tool.h"
 #include "scenes/camera.h"
 
@@ -78,6 +79,7 @@ void RenderJob::validate() const {
           "--gradients cannot be combined with --firefly-limit, because the differences of pixels are not limited");
   require(!gradients || !aovs.contains(Aov::variance),
           "--gradients cannot be combined with --aov variance, because it is not known for a reconstructed picture");
+  checkLossless(exr, aovs);
   require(merge.first > 0 && std::isfinite(merge.first), "--merge-radius must be a finite number greater than 0");
   require(merge.alpha > 0 && merge.alpha <= 1, "--merge-alpha must be greater than 0 and at most 1");
   require(!fireflyLimit || (*fireflyLimit > 0 && std::isfinite(*fireflyLimit)),

@@ -75,6 +75,24 @@ TEST_CASE("AOVs: those of merged parts are those of the whole picture") {
   for (const auto& [aov, image] : whole) CHECK(largestDifference(merged.at(aov), image) < 1e-4f);
 }
 
+TEST_CASE("AOVs: variance and number of samples are not stored with a compression that changes them") {
+  const SceneFolder folder(false);
+  const std::string render = "loberender scene.xml --spp 2 --integrator path --exr-compression ";
+  for (const std::string options : {"dwaa --aov all", "dwab --aov albedo,variance", "dwab --aov samples"})
+    CHECK_THAT(fault(folder, render + options + " -o a.exr", 2),
+               Catch::Contains("--exr-compression " + options.substr(0, 4)) && Catch::Contains("use zip"));
+  CHECK(folder.run(render + "dwaa --aov all -o a.png").code == 0);
+  CHECK(folder.run(render + "dwaa --aov albedo,normal,depth -o a.exr").code == 0);
+  REQUIRE(folder.run(render + "zip --aov samples -o a.exr").code == 0);
+  REQUIRE(folder.run(render + "zip --aov samples --seed 2 -o b.exr").code == 0);
+  const ToolRun merge = folder.run("lobecompare --merge c.exr a.exr b.exr --exr-compression dwaa --variance v.exr");
+  CHECK(merge.code == 2);
+  CHECK_THAT(merge.error, Catch::Contains("--exr-compression dwaa") && Catch::Contains("use zip"));
+  CHECK(!folder.has("c.exr"));
+  CHECK(!folder.has("v.exr"));
+  CHECK(folder.run("lobecompare --merge c.exr a.exr b.exr").code == 0);
+}
+
 TEST_CASE("AOVs: wrong lists are errors that name the known ones") {
   const SceneFolder folder(false);
   for (const std::string list : {"colour", "albedo,depths", "albedo,,depth", "Albedo"})
