@@ -137,12 +137,19 @@ void takeRenamed(const std::string& tool, const RenamedOption& option, std::vect
   }
 }
 
+/// A validator of CLI11 for values that must not be empty, as those of shell variables are that are not set.
+CLI::Validator notEmpty() {
+  const auto check = [](const std::string& text) { return std::string(text.empty() ? "must not be empty" : ""); };
+  return {check, ""};
+}
+
 /// Declares the options and parses the arguments. Returns false after --help and --version, which print a text.
 bool parse(CLI::App& app, const std::string& name, int argc, char** argv, const std::function<void(CLI::App&)>& declare,
            const std::vector<RenamedOption>& renamed) {
   app.option_defaults()->always_capture_default();
   app.set_version_flag("--version", name + " " LOBE_VERSION);
   declare(app);
+  for (CLI::Option* option : app.get_options()) option->check(notEmpty());
   std::vector<std::string> arguments(argv + std::min(argc, 1), argv + argc);
   for (const RenamedOption& option : renamed) takeRenamed(name, option, arguments);
   std::ranges::reverse(arguments);  // CLI11 expects the arguments in reverse order

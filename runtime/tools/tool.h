@@ -34,7 +34,8 @@ struct RenamedOption {
 };
 
 /// Runs a tool: declare adds options to the CLI::App, which parses argv, then work runs. Returns the exit code: 0 on
-/// success (also after --help and --version); 1 if work throws; 2 if parsing fails or anything throws UsageError.
+/// success (also after --help and --version); 1 if work throws; 2 if parsing fails, the value of an option is empty, or
+/// anything throws UsageError.
 /// Errors go to stderr, with "NAME: error: " before each line of the message. Renamed options are accepted with a note.
 /// If work throws Stopped, its message is printed and the result is 128 plus the number of the signal.
 int runTool(const std::string& name, std::string_view description, int argc, char** argv,

@@ -150,6 +150,38 @@ TEST_CASE("tools: a wrong name of a value is one line with the permitted names")
   }
 }
 
+TEST_CASE("tools: an empty value of an option is wrong usage") {
+  const SceneFolder folder(false);
+  const std::string render = kPath + " --spp 1 -o a.exr ";
+  std::vector<std::pair<std::string, std::string>> cases;
+  for (const std::string option :
+       {"--resume", "--checkpoint", "--stats", "--save-illumination", "--illumination", "--camera", "--reference",
+        "--convergence", "--cache", "--record-image", "--size", "--record", "--aov", "--output", "--integrator"})
+    cases.emplace_back(render, option);
+  for (const std::string option : {"--merge", "--map", "--variance", "--agree-with"})
+    cases.emplace_back("lobecompare a.exr b.exr ", option);
+  for (const std::string option : {"--html", "--points", "--plot", "--scene"})
+    cases.emplace_back("lobedump a.lobe ", option);
+  for (const std::string option : {"--output", "--camera", "--method"})
+    cases.emplace_back("lobefit scene.xml ", option);
+  for (const auto& [command, option] : cases) {
+    CAPTURE(command, option);
+    const ToolRun run = folder.run(command + option + " ''");
+    CHECK(run.code == 2);
+    CHECK_THAT(run.error, Contains(option + ": must"));
+    CHECK(lineCount(run.error) == 1);
+  }
+  for (const std::string command :
+       {"loberender '' -o a.exr --spp 1", "lobefit ''", "lobedump ''", "lobedump --diff a ''", "lobecompare '' a.exr",
+        "lobecompare a.exr ''", "lobecompare --png a.exr ''"}) {
+    CAPTURE(command);
+    const ToolRun run = folder.run(command);
+    CHECK(run.code == 2);
+    CHECK_THAT(run.error, Contains("must not be empty"));
+  }
+  CHECK(folder.files() == 1);
+}
+
 TEST_CASE("loberender: outputs beyond the file size limit are errors, and leave no temporary files") {
   const SceneFolder folder(true);
   // The limit lets the statistics through, but neither the pictures nor the illumination.
