@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <optional>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -23,8 +24,38 @@ namespace {
   throw std::runtime_error(fmt::format("{}: cannot write: {}", path.string(), std::strerror(error)));
 }
 
+constexpr int kMostLinks = 40;  // the limit of Linux
+
+/// The name to which a symbolic link leads; nullopt if it is none.
+std::optional<fs::path> targetOfLink(const fs::path& path) {
+  std::error_code error;
+  const fs::path next = fs::read_symlink(path, error);
+  if (error) return std::nullopt;
+  return path.parent_path() / next;  // an absolute target replaces the folder
+}
+
+/// Whether the path is below /dev or /proc, except for /dev/shm, where files are ordinary ones.
+bool isSystemName(const fs::path& path) {
+  std::error_code error;
+  const std::string folder = fs::weakly_canonical(fs::absolute(path, error).parent_path(), error).string() + "/";
+  return folder.starts_with("/proc/") || (folder.starts_with("/dev/") && !folder.starts_with("/dev/shm/"));
+}
+
+/// Whether the path is such a name, or leads to one. /dev/stdout may lead on to a regular file, which would be replaced
+/// instead of written to.
+bool leadsToSystemName(fs::path path) {
+  for (int i = 0; i <= kMostLinks; ++i) {
+    if (isSystemName(path)) return true;
+    const std::optional<fs::path> next = targetOfLink(path);
+    if (!next) break;
+    path = *next;
+  }
+  return false;
+}
+
 /// The file to replace: symbolic links are followed, including those to files that do not exist yet. Throws unless it
-/// is a regular file or absent, so that `-o /dev/null` does not replace the device.
+/// is a regular file or absent, so that `-o /dev/null` does not replace the device, and if a name below /dev or /proc
+/// is on the way.
 fs::path targetOf(const fs::path& path) {
   std::error_code error;
   fs::path target = followLinks(path);
@@ -34,6 +65,8 @@ fs::path targetOf(const fs::path& path) {
   if (fs::is_directory(status)) throw std::runtime_error(path.string() + ": cannot write: is a directory");
   if (fs::exists(status) && !fs::is_regular_file(status))
     throw std::runtime_error(path.string() + ": cannot write: not a regular file");
+  if (leadsToSystemName(path))
+    throw std::runtime_error(path.string() + ": cannot write: files below /dev and /proc are not replaced");
   return target;
 }
 
@@ -140,12 +173,10 @@ class Temporary {
 }  // namespace
 
 fs::path followLinks(fs::path path) {
-  constexpr int kMostLinks = 40;  // the limit of Linux
-  std::error_code error;
   for (int i = 0; i < kMostLinks; ++i) {
-    const fs::path next = fs::read_symlink(path, error);
-    if (error) break;
-    path = path.parent_path() / next;  // an absolute target replaces the folder
+    const std::optional<fs::path> next = targetOfLink(path);
+    if (!next) break;
+    path = *next;
   }
   return path;
 }

@@ -9,8 +9,9 @@ namespace lobe {
 
 /// Writes bytes or text to a temporary file in the folder of `path`, and renames it to `path`. If that fails, the
 /// temporary file is removed, a file at `path` keeps its content, and std::runtime_error that names `path` is thrown.
-/// The folder must exist. A file that is replaced keeps its permissions where the file system permits that; otherwise
-/// it is only replaced if the new one grants no more.
+/// The folder must exist. Names below /dev and /proc are refused, except for /dev/shm, because they are those of
+/// devices and open files, which would be replaced instead of written to. A file that is replaced keeps its permissions
+/// where the file system permits that; otherwise it is only replaced if the new one grants no more.
 void writeAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void writeAtomically(const std::filesystem::path& path, const std::string& text);
 

@@ -182,6 +182,24 @@ TEST_CASE("tools: an empty value of an option is wrong usage") {
   CHECK(folder.files() == 1);
 }
 
+TEST_CASE("tools: outputs are not written through names of open files") {
+  const SceneFolder folder(false);
+  fs::create_symlink("/dev/stdout", folder / "link.json");
+  fs::create_directory_symlink("/proc/self/fd", folder / "open");
+  const std::string render = kBin + kPath + " --spp 1 -o a.exr --stats ";
+  for (const std::string name :
+       {"/dev/stdout", "/dev/fd/1", "/proc/self/fd/1", "link.json", "open/1", "/dev/none.json", "/proc/none.json"}) {
+    CAPTURE(name);
+    folder.write("log", "before\n");
+    CHECK(runIn(folder, render + name + " >>log 2>error") == "1");
+    CHECK(folder.bytes("log") == "before\n");
+    CHECK_THAT(folder.bytes("error"), Contains(name + ": cannot write: files below /dev and /proc are not replaced"));
+    CHECK(runIn(folder, "(" + render + name + " 2>error; echo $? >code) | cat; grep -q 1 code") == "0");
+    CHECK_THAT(folder.bytes("error"), Contains(name + ": cannot write: "));
+  }
+  CHECK_FALSE(folder.has("a.exr"));
+}
+
 TEST_CASE("loberender: outputs beyond the file size limit are errors, and leave no temporary files") {
   const SceneFolder folder(true);
   // The limit lets the statistics through, but neither the pictures nor the illumination.
