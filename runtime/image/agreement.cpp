@@ -16,20 +16,12 @@ struct Estimate {
   double mean = 0, variance = 0, freedom = 0;
 };
 
-void check(const Image& image, const Image& first) {
-  if (image.width != first.width || image.height != first.height)
-    throw std::runtime_error(fmt::format("the image has {}x{} pixels, the first {}x{}", image.width, image.height,
-                                         first.width, first.height));
-  if (!std::ranges::all_of(image.pixels, [](const Rgb& p) { return p.allFinite(); }))
-    throw std::runtime_error("an image has pixels that are not finite");
-}
-
 void check(std::span<const WeightedPicture> a, std::span<const WeightedPicture> b) {
   if (a.size() < 2 || b.size() < 2)
     throw std::runtime_error("the test of agreement needs at least two images of each method");
   if (a[0].image.pixels.empty()) throw std::runtime_error("the images have no pixels");
   for (const auto& pictures : {a, b})
-    for (const WeightedPicture& picture : pictures) check(picture.image, a[0].image);
+    for (const WeightedPicture& picture : pictures) checkComparable(picture.image, a[0].image);
 }
 
 /// The sums of the channels of all pixels of each block, row by row; blocks at the border may be smaller.
@@ -106,6 +98,14 @@ double deviateOf(double probability) {
 }
 
 }  // namespace
+
+void checkComparable(const Image& image, const Image& first) {
+  if (image.width != first.width || image.height != first.height)
+    throw std::runtime_error(fmt::format("the image has {}x{} pixels, the first {}x{}", image.width, image.height,
+                                         first.width, first.height));
+  if (!std::ranges::all_of(image.pixels, [](const Rgb& p) { return p.allFinite(); }))
+    throw std::runtime_error("the image has pixels that are not finite");
+}
 
 Agreement testAgreement(std::span<const WeightedPicture> a, std::span<const WeightedPicture> b) {
   check(a, b);

@@ -34,6 +34,9 @@ struct Agreement {
   int worstX = 0, worstY = 0;  ///< the top left pixel of the worst block
 };
 
+/// Throws std::runtime_error if the image has another size than the first one or a pixel that is not finite.
+void checkComparable(const Image& image, const Image& first);
+
 /// a, b: the pictures of each method, at least two, with positive samples. Throws std::runtime_error if there are
 /// fewer, sizes differ, there are no pixels, or one is not finite.
 Agreement testAgreement(std::span<const WeightedPicture> a, std::span<const WeightedPicture> b);

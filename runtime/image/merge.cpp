@@ -103,7 +103,7 @@ Part describe(const std::filesystem::path& path) {
         path.string(), *interrupted));
   if (!samples || *samples == 0)
     throw std::runtime_error(
-        fmt::format("{}: does not say how many samples it has; merge .exr files written by loberender", path.string()));
+        fmt::format("{}: does not say how many samples it has, as .exr files written by loberender do", path.string()));
   const auto gradients = find<std::string>(part.attributes, "gradients");
   if (gradients && gradients->starts_with("l1"))
     throw std::runtime_error(fmt::format(

@@ -46,8 +46,8 @@ void declare(CLI::App& app, Arguments& arguments) {
                  "Reference image; with --merge or --pair, the first of the images; with --png, the input")
       ->required()
       ->type_name("FILE");
+  // Its number is checked later: if it was required here, it would take the last image of --agree-with.
   app.add_option("IMAGE", arguments.images, "Images of the same size as the reference; with --png, the output")
-      ->required()
       ->type_name("FILE")
       ->default_str("");
   auto* json = app.add_flag("--json", arguments.json, "Print the errors as JSON");
@@ -118,7 +118,14 @@ void checkPng(const Arguments& arguments) {
   lobe::checkOutputs({output}, {arguments.reference});
 }
 
+void checkNumber(const Arguments& arguments) {
+  if (!arguments.others.empty() && (arguments.images.empty() || arguments.others.size() < 2))
+    throw lobe::UsageError("--agree-with needs at least two images of each method");
+  if (arguments.images.empty()) throw lobe::UsageError("IMAGE is required (see lobecompare --help)");
+}
+
 void checkArguments(const Arguments& arguments) {
+  checkNumber(arguments);
   if (arguments.png) return checkPng(arguments);
   if (!arguments.merge.empty()) checkMerge(arguments);
   if (arguments.pair && arguments.images.size() != 1) throw lobe::UsageError("--pair takes two images");
@@ -237,11 +244,14 @@ void comparePair(const Arguments& arguments) {
 
 // ---- Agreement of two methods
 
-std::vector<lobe::WeightedPicture> readPictures(const std::vector<std::filesystem::path>& paths) {
+/// first: the image whose size all must have; null: the first of these.
+std::vector<lobe::WeightedPicture> readPictures(const std::vector<std::filesystem::path>& paths,
+                                                const lobe::Image* first) {
   std::vector<lobe::WeightedPicture> pictures;
   for (std::size_t i = 0; i < paths.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) lobe::checkDifferentSeeds(paths[j], paths[i]);
     pictures.push_back({lobe::readImage(paths[i]), lobe::samplesOf(paths[i])});
+    measured(paths[i].string(), [&] { lobe::checkComparable(pictures[i].image, first ? *first : pictures[0].image); });
   }
   return pictures;
 }
@@ -255,9 +265,10 @@ void printAgreement(const lobe::Agreement& a) {
 }
 
 void testAgreement(const Arguments& arguments) {
-  const std::vector<lobe::WeightedPicture> pictures = readPictures(all(arguments)),
-                                           others = readPictures({arguments.others.begin(), arguments.others.end()});
-  const lobe::Agreement a = measured(arguments.others[0], [&] { return lobe::testAgreement(pictures, others); });
+  const std::vector<lobe::WeightedPicture> pictures = readPictures(all(arguments), nullptr);
+  const std::vector<lobe::WeightedPicture> others =
+      readPictures({arguments.others.begin(), arguments.others.end()}, &pictures[0].image);
+  const lobe::Agreement a = lobe::testAgreement(pictures, others);
   if (!arguments.json) return printAgreement(a);
   const nlohmann::ordered_json json{{"agree", a.agree},
                                     {"mean_ratio", a.meanRatio},

@@ -125,6 +125,24 @@ TEST_CASE("agreement: lobecompare writes the variance of merged pictures and tes
           2);
     CHECK(lobecompare("--merge " + merged + " --variance v.png " + a).code == 2);
   }
+  SECTION("faults name the file that has them") {
+    const std::string file = folder / "bad.exr", png = folder / "bad.png";
+    const auto fault = [&](const std::string& arguments) {
+      const ToolRun run = lobecompare(arguments);
+      CHECK(run.code == 1);
+      CHECK(lineCount(run.error) == 1);
+      return run.error;
+    };
+    writeImage(file, Image(47, 40), {{"integrator", "path"}, {"seed", 9.0}, {"samples", 1.0}});
+    CHECK_THAT(fault(a + "--agree-with " + b + file), Catch::Contains(file + ": the image has 47x40 pixels"));
+    CHECK_THAT(fault(a + file + " --agree-with " + b), Catch::Contains(file + ": the image has 47x40 pixels"));
+    writeImage(file, Image(48, 40, grey(std::numeric_limits<float>::infinity())),
+               {{"integrator", "path"}, {"seed", 9.0}, {"samples", 1.0}});
+    CHECK_THAT(fault(a + file + " --agree-with " + b), Catch::Contains(file + ": the image has pixels that are not"));
+    writeImage(png, Image(48, 40));
+    CHECK_THAT(fault(a + png + " --agree-with " + b),
+               Catch::Contains(png + ": does not say how many samples it has") && !Catch::Contains("merge"));
+  }
   SECTION("agreement") {
     const ToolRun run = lobecompare("--json " + a + "--agree-with " + b);
     REQUIRE(run.code == 0);
@@ -132,7 +150,13 @@ TEST_CASE("agreement: lobecompare writes the variance of merged pictures and tes
     CHECK(json["agree"] == true);
     CHECK(json["blocks"] == 30);
     CHECK_THAT(lobecompare(a + "--agree-with " + b).out, Catch::StartsWith("agree: ratio of means"));
-    CHECK(lobecompare(a + "--agree-with " + (folder / "0.exr").string()).code == 1);
+    const ToolRun one = lobecompare(a + "--agree-with " + (folder / "4.exr").string());
+    CHECK(one.code == 2);
+    CHECK(one.error == "lobecompare: error: --agree-with needs at least two images of each method\n");
+    // The only image of the first method must not be joined by one of the second.
+    const ToolRun first = lobecompare((folder / "0.exr").string() + " --agree-with " + b);
+    CHECK(first.code == 2);
+    CHECK(first.error == one.error);
     CHECK(lobecompare(a + "--pair --agree-with " + b).code == 2);
   }
 }
