@@ -7,8 +7,9 @@
 
 namespace lobe {
 
-/// The most pixels of a picture; larger sizes are assumed to be typing errors.
+/// The most pixels of a picture, and of a side of it; larger sizes are assumed to be typing errors.
 inline constexpr std::int64_t kMaxPicturePixels = std::int64_t{1} << 28;
+inline constexpr int kMaxPictureSide = 1 << 16;
 
 /// The full horizontal angle in degrees when camera.fov is measured along camera.fovAxis ("x", "y", "diagonal",
 /// "smaller" or "larger" side) of an image of this size. Pixels are square.

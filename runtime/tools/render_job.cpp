@@ -57,9 +57,13 @@ void RenderJob::validate() const {
           "--save-illumination cannot be combined with --illumination, which replaces training, unless --passes or "
           "--train-seconds continue the training");
   require(!seconds || (*seconds > 0 && std::isfinite(*seconds)), "--seconds must be a finite number greater than 0");
-  require(
-      !size || (size->first >= 1 && size->second >= 1 && std::int64_t{size->first} * size->second <= kMaxPicturePixels),
-      fmt::format("--size must be at least 1x1 and at most {} pixels", kMaxPicturePixels));
+  const auto isSize = [](const std::pair<int, int>& pixels) {
+    const auto [width, height] = pixels;
+    return width >= 1 && height >= 1 && width <= kMaxPictureSide && height <= kMaxPictureSide &&
+           std::int64_t{width} * height <= kMaxPicturePixels;
+  };
+  require(!size || isSize(*size), fmt::format("--size must be at least 1x1 and at most {} pixels, and {} on a side",
+                                              kMaxPicturePixels, kMaxPictureSide));
   require(!maxDepth || *maxDepth >= 1, "--max-depth must be at least 1");
   require(!trainSeconds || (*trainSeconds > 0 && std::isfinite(*trainSeconds)),
           "--train-seconds must be a finite number greater than 0");

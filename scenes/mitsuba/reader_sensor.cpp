@@ -111,10 +111,9 @@ std::optional<FilmCrop> readCrop(const Parameters& parameters, int filmWidth, in
 }
 
 FilmSize readSize(const Parameters& parameters, const Camera& camera) {
-  constexpr int kLargest = 1 << 16;
   FilmSize size;
-  size.width = readPixels(parameters, "width", camera.width, 1, kLargest);
-  size.height = readPixels(parameters, "height", camera.height, 1, kLargest);
+  size.width = readPixels(parameters, "width", camera.width, 1, kMaxPictureSide);
+  size.height = readPixels(parameters, "height", camera.height, 1, kMaxPictureSide);
   size.crop = readCrop(parameters, size.width, size.height);
   checkPicture(size.crop ? size.crop->width : size.width, size.crop ? size.crop->height : size.height);
   return size;

@@ -150,6 +150,8 @@ TEST_CASE("loberender: invalid command lines are errors") {
       {" --spp 1 --size 16x12x3", "--size"},
       {" --spp 1 --size 1000000x1000000", "--size"},
       {" --spp 1 --size 4294967297x1", "--size"},
+      {" --spp 1 --size 65537x1", "at most 268435456 pixels, and 65536 on a side"},
+      {" --spp 1 --size 1x65537", "at most 268435456 pixels, and 65536 on a side"},
       {" --spp 1 --size 16x", "--size"},
       {" --spp 1 --max-depth 0", "--max-depth"},
       {" --spp 1 --seed -1", "--seed"},
