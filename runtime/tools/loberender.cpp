@@ -81,9 +81,9 @@ struct Options {
   std::string size, record, aovs;
   int threads = 0;
   bool check = false, json = false;
-  // Options that some integrators ignore.
+  // Options that some integrators, or gradients, ignore.
   const CLI::Option *guide = nullptr, *reduction = nullptr, *roulette = nullptr, *lightPaths = nullptr,
-                    *shadowSurfaces = nullptr;
+                    *shadowSurfaces = nullptr, *filtering = nullptr;
   std::vector<const CLI::Option*> training, merging;
   std::vector<CLI::Option*> exr;  // for .exr files only
 };
@@ -251,29 +251,39 @@ void declare(CLI::App& app, Options& options) {
   options.reduction = app.get_option("--reduction");
   options.lightPaths = app.get_option("--light-paths");
   options.shadowSurfaces = app.get_option("--shadow-surfaces");
+  options.filtering = app.get_option("--filtering");
   options.roulette = app.get_option("--russian-roulette");
   declareTraining(app, options);
   addDefinitions(app, job.definitions);
   addThreads(app, options.threads);
 }
 
-/// Options that the integrator ignores are not errors, so that a script can pass the same options to all integrators.
+/// Options that the integrator or --gradients ignores are not errors, so that a script can pass the same options to all
+/// integrators.
 void noteUnused(const Options& options) {
   const RenderJob& job = options.job;
-  std::vector<std::string> unused;
-  const auto note = [&](const CLI::Option* option, bool used) {
-    if (option->count() > 0 && !used) unused.push_back(option->get_name());
+  std::vector<std::string> unused, unusedByGradients;
+  const auto note = [&](const CLI::Option* option, bool used, bool usedByGradients = true) {
+    if (option->count() == 0) return;
+    if (!used)
+      unused.push_back(option->get_name());
+    else if (job.gradients && !usedByGradients)
+      unusedByGradients.push_back(option->get_name());
   };
   note(options.guide, job.integrator == IntegratorKind::bdpt);
   for (const CLI::Option* option : options.merging) note(option, job.integrator == IntegratorKind::vcm);
   for (const CLI::Option* option : options.training)
     note(option, option->get_name() == "--bsdf-fraction" ? job.mayUseProduct() : job.guided());
   note(options.reduction, job.guided());
-  note(options.lightPaths, job.mayUseLightPaths());
+  const bool isUnidirectional = job.guided() && job.integrator != IntegratorKind::bdpt;
+  note(options.lightPaths, isUnidirectional, job.lightPaths == LightPathUse::off);
   note(options.shadowSurfaces, job.connectsThroughSurfaces());
-  note(options.roulette, job.guided() && job.integrator != IntegratorKind::bdpt && !job.gradients);
+  note(options.roulette, isUnidirectional, job.russianRoulette == RussianRoulette::throughput);
+  note(options.filtering, true, job.filtering == PixelFiltering::importance);
   if (!unused.empty())
     printNote("loberender", fmt::format("--integrator {} ignores {}", nameOf(job.integrator), fmt::join(unused, ", ")));
+  if (!unusedByGradients.empty())
+    printNote("loberender", fmt::format("--gradients ignores {}", fmt::join(unusedByGradients, ", ")));
 }
 
 /// AOVs and the format of pixels are for .exr files only.

@@ -266,6 +266,32 @@ TEST_CASE("loberender: bidirectional pictures do not depend on the number of thr
   CHECK_THAT(unused, Catch::Contains("--aov has no effect") && Catch::Contains("--exr-type has no effect"));
 }
 
+TEST_CASE("loberender: notes say whether the integrator or --gradients ignores an option") {
+  const SceneFolder folder(false);
+  const std::string render =
+      "loberender scene.xml --spp 1 -o a.exr --light-paths on --russian-roulette efficiency "
+      "--filtering splatting" +
+      kTraining + " --integrator ";
+  ToolRun run = folder.run(render + "guided --gradients l2");
+  CHECK(run.code == 0);
+  CHECK_THAT(run.error, Catch::Contains("note: --gradients ignores --light-paths, --russian-roulette, --filtering\n") &&
+                            !Catch::Contains("--integrator"));
+  run = folder.run(render + "path --gradients l2");
+  CHECK(run.code == 0);
+  CHECK_THAT(run.error, Catch::Contains("note: --integrator path ignores --passes") &&
+                            Catch::Contains("--light-paths, --russian-roulette\n") &&
+                            Catch::Contains("note: --gradients ignores --filtering\n"));
+  run = folder.run(render + "guided");
+  CHECK(run.code == 0);
+  CHECK_THAT(run.error, !Catch::Contains("ignores"));
+  run = folder.run(
+      "loberender scene.xml --spp 1 -o a.exr --integrator guided --gradients l2 --filtering importance "
+      "--light-paths off --russian-roulette throughput" +
+      kTraining);
+  CHECK(run.code == 0);
+  CHECK_THAT(run.error, !Catch::Contains("ignores"));
+}
+
 TEST_CASE("loberender: pictures from gradients do not depend on the number of threads and are not negative") {
   const SceneFolder folder(true);
   const std::string integrator = GENERATE("path", "guided", "product", "bdpt", "bdpt --guide product");
