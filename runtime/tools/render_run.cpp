@@ -215,7 +215,11 @@ void Run::readCheckpoint() {
         restoreIllumination(IlluminationFile::parse(resumed_->importance(), job_.resume), job_.resume, *scene_).field;
   guiding_.training.report = trainingOf(*resumed_);
   restoreChoices(*resumed_, guiding_);
-  printNote(kTool, fmt::format("{}: continues with sample {} of each pixel", job_.resume.string(), least + 1));
+  const bool isComplete = job_.samples && least == static_cast<std::uint32_t>(*job_.samples);
+  printNote(kTool, isComplete
+                       ? fmt::format("{}: is complete already with --spp {}; a larger number adds samples",
+                                     job_.resume.string(), least)
+                       : fmt::format("{}: continues with sample {} of each pixel", job_.resume.string(), least + 1));
 }
 
 void Run::readStored(const IlluminationFile& file) {

@@ -446,7 +446,10 @@ TEST_CASE("loberender: a resumed render has the bytes of an uninterrupted one") 
     for (const char* key : {"scene_hash", "cache_hashes", "rays", "spp", "training_particles", "records",
                             "strategy_fractions", "guiding_decisions", "largest_contributions", "firefly_cut_fraction"})
       CHECK(whole[key] == part[key]);
-    CHECK(folder.run(render + " --spp 6 -o again.exr --resume run.ckpt").code == 0);
+    const ToolRun again = folder.run(render + " --spp 6 -o again.exr --resume run.ckpt");
+    CHECK(again.code == 0);
+    CHECK_THAT(again.error, Contains("run.ckpt: is complete already with --spp 6; a larger number adds samples"));
+    CHECK_THAT(again.error, !Contains("continues"));
     CHECK(folder.bytes("again.exr") == folder.bytes("whole.exr"));
     CHECK_THAT(fault(folder, render + " --spp 5 -o part.exr --resume run.ckpt", 1), Contains("more than --spp 5"));
   }
