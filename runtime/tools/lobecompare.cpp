@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include <fmt/format.h>
@@ -145,10 +146,22 @@ auto measured(const std::string& name, const Measure& measure) {
   }
 }
 
+/// Such pixels are black, whatever the expected value of the picture.
+void noteMissingSamples(const std::string& name) {
+  const lobe::ImageAttributes attributes = lobe::readAttributes(name);
+  const auto found = attributes.find("interrupted");
+  const auto* samples = found == attributes.end() ? nullptr : std::get_if<std::string>(&found->second);
+  if (samples && samples->starts_with("0 "))
+    lobe::printNote("lobecompare", fmt::format("{}: its run was interrupted in the first pass, and it has {}; pixels "
+                                               "without a sample are black",
+                                               name, *samples));
+}
+
 /// A map that cannot be written is added to the errors.
 Comparison compare(const lobe::Image& reference, const std::string& name, const std::string& map,
                    lobe::OutputErrors& errors) {
   const lobe::Image image = lobe::readImage(name);
+  noteMissingSamples(name);
   Comparison result{name, measured(name, [&] { return lobe::compareImages(reference, image); })};
   if (!map.empty())
     errors.attempt(map, [&] { lobe::writeErrorMap(map, image.width, lobe::relativeErrors(reference, image)); });
@@ -237,6 +250,7 @@ void comparePair(const Arguments& arguments) {
   const lobe::Image a = lobe::readImage(arguments.reference), b = lobe::readImage(name);
   lobe::checkDifferentSeeds(arguments.reference, name);
   noteDifferences(arguments.reference, name);
+  for (const std::string& image : {arguments.reference, name}) noteMissingSamples(image);
   const lobe::PairVariance variance = measured(name, [&] { return lobe::comparePair(a, b); });
   arguments.json ? printJson(variance, arguments) : printTable(variance, arguments);
   if (!arguments.map.empty()) lobe::writeErrorMap(arguments.map, a.width, lobe::relativeVariances(a, b));
@@ -283,6 +297,7 @@ void testAgreement(const Arguments& arguments) {
 
 lobe::Image readReference(const Arguments& arguments) {
   const lobe::Image reference = lobe::readImage(arguments.reference);
+  noteMissingSamples(arguments.reference);
   try {
     return lobe::averagedDown(reference, arguments.shrink);
   } catch (const std::runtime_error& e) {

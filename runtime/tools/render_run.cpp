@@ -384,6 +384,7 @@ std::string Run::stopMessage() const {
     message += ", so no picture is written";
   else
     message += errors_.all().empty() ? " are rendered and written" : " are rendered, but not all outputs are written";
+  if (least == 0 && most > 0) message += "; pixels without a sample are black";
   if (checkpointIsWritten_) message += fmt::format("; --resume {} goes on", shellQuoted(job_.checkpoint.string()));
   return message;
 }

@@ -106,6 +106,23 @@ TEST_CASE("render: lobecompare --pair notes different scenes and integrators, an
                             Catch::Contains("different integrators;"));
 }
 
+TEST_CASE("render: lobecompare notes pixels without samples") {
+  const Folder folder;
+  const std::string whole = folder / "whole.exr", later = folder / "later.exr", first = folder / "first.exr";
+  writeImage(whole, Image(4, 4, grey(0.5f)), {{"samples", 2.0}});
+  writeImage(later, Image(4, 4, grey(0.5f)), {{"interrupted", "1 to 2 samples per pixel"}});
+  writeImage(first, Image(4, 4), {{"interrupted", "0 to 1 samples per pixel"}});
+  for (const std::string options : {"", "--json ", "--pair "}) {
+    CAPTURE(options);
+    const std::string note = "it has 0 to 1 samples per pixel; pixels without a sample are black";
+    CHECK_THAT(lobecompare(options + whole + " " + later).error, !Catch::Contains("without a sample"));
+    CHECK_THAT(lobecompare(options + whole + " " + first).error,
+               Catch::Contains("note: " + first) && Catch::Contains(note));
+    CHECK_THAT(lobecompare(options + first + " " + later).error,
+               Catch::Contains("note: " + first) && Catch::Contains(note));
+  }
+}
+
 TEST_CASE("render: lobecompare --pair compares PNG files by their linear values") {
   const Folder folder;
   const std::string a = folder / "a.png", b = folder / "b.png";

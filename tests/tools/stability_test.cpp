@@ -339,6 +339,22 @@ TEST_CASE("loberender: an interrupted render writes the picture so far") {
   }
 }
 
+TEST_CASE("loberender: a render that is interrupted in its first pass says that pixels are black") {
+  const SceneFolder folder(false);
+  Background render(folder, kPath + " -o a.exr --spp 1000000 --size 1200x900 --checkpoint run.ckpt");
+  waitFor([&] { return folder.has("run.ckpt"); });  // written before the first pass
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  render.send(SIGINT);
+  CHECK(render.wait() == 130);
+  // Usually the first pass is interrupted; it may have ended, or not begun, on a machine that is busy or fast.
+  if (!folder.has("a.exr")) return;
+  const ImageAttributes attributes = attributesOf(folder, "a.exr");
+  const bool isFirst =
+      attributes.contains("interrupted") && std::get<std::string>(attributes.at("interrupted")).starts_with("0 to 1 ");
+  CAPTURE(folder.bytes("error"));
+  CHECK(isFirst == (folder.bytes("error").find("; pixels without a sample are black") != std::string::npos));
+}
+
 TEST_CASE("loberender: the message of an interrupted render says what could not be written") {
   for (const auto& [outputs, end] :
        {std::pair("-o sub/b.png --checkpoint run.ckpt", "not all outputs are written; --resume run.ckpt goes on\n"),
