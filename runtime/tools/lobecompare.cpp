@@ -230,26 +230,29 @@ void printTable(const lobe::PairVariance& v, const Arguments& arguments) {
   table.print(stdout);
 }
 
-/// Such pairs are compared, too, because integrators without a bias have the same expected picture.
-void noteDifferences(const std::string& a, const std::string& b) {
+/// Prints a note if both pictures have the attribute, with different values. Returns whether. Such pictures are
+/// compared, too, because integrators without a bias have the same expected picture. what: the attribute, in the
+/// plural.
+bool noteDifferent(const std::string& a, const std::string& b, const char* key, const char* what) {
   const lobe::ImageAttributes ofA = lobe::readAttributes(a), ofB = lobe::readAttributes(b);
-  const std::pair<const char*, const char*> compared[] = {{"sceneHash", "scenes or cameras"},
-                                                          {"integrator", "integrators"}};
-  for (const auto& [key, text] : compared) {
-    const auto one = ofA.find(key), other = ofB.find(key);
-    if (one != ofA.end() && other != ofB.end() && one->second != other->second)
-      lobe::printNote("lobecompare",
-                      fmt::format("{} and {}: are pictures of different {}; their difference is noise alone only if "
-                                  "both have the same expected value",
-                                  a, b, text));
-  }
+  const auto one = ofA.find(key), other = ofB.find(key);
+  if (one == ofA.end() || other == ofB.end() || one->second == other->second) return false;
+  lobe::printNote("lobecompare", fmt::format("{} and {}: are pictures of different {}; their difference is noise alone "
+                                             "only if both have the same expected value",
+                                             a, b, what));
+  return true;
+}
+
+bool noteDifferentScenes(const std::string& a, const std::string& b) {
+  return noteDifferent(a, b, "sceneHash", "scenes or cameras");
 }
 
 void comparePair(const Arguments& arguments) {
   const std::string& name = arguments.images[0];
   const lobe::Image a = lobe::readImage(arguments.reference), b = lobe::readImage(name);
   lobe::checkDifferentSeeds(arguments.reference, name);
-  noteDifferences(arguments.reference, name);
+  noteDifferentScenes(arguments.reference, name);
+  noteDifferent(arguments.reference, name, "integrator", "integrators");
   for (const std::string& image : {arguments.reference, name}) noteMissingSamples(image);
   const lobe::PairVariance variance = measured(name, [&] { return lobe::comparePair(a, b); });
   arguments.json ? printJson(variance, arguments) : printTable(variance, arguments);
@@ -278,10 +281,18 @@ void printAgreement(const lobe::Agreement& a) {
       lobe::kAgreementBlock, a.worstX, a.worstY, a.limitZ);
 }
 
+/// One note is enough.
+void noteScenes(const Arguments& arguments) {
+  for (const auto& images : {arguments.images, arguments.others})
+    for (const std::string& image : images)
+      if (noteDifferentScenes(arguments.reference, image)) return;
+}
+
 void testAgreement(const Arguments& arguments) {
   const std::vector<lobe::WeightedPicture> pictures = readPictures(all(arguments), nullptr);
   const std::vector<lobe::WeightedPicture> others =
       readPictures({arguments.others.begin(), arguments.others.end()}, &pictures[0].image);
+  noteScenes(arguments);
   const lobe::Agreement a = lobe::testAgreement(pictures, others);
   if (!arguments.json) return printAgreement(a);
   const nlohmann::ordered_json json{{"agree", a.agree},

@@ -143,6 +143,19 @@ TEST_CASE("agreement: lobecompare writes the variance of merged pictures and tes
     CHECK_THAT(fault(a + png + " --agree-with " + b),
                Catch::Contains(png + ": does not say how many samples it has") && !Catch::Contains("merge"));
   }
+  SECTION("pictures of different scenes are noted once") {
+    std::string of[2];
+    for (int i = 0; i < 4; ++i) {
+      const std::string file = folder / fmt::format("scene-{}.exr", i);
+      writeImage(file, noisy(1, rng), {{"sceneHash", i < 2 ? "0a" : "0b"}, {"seed", 1.0 * i}, {"samples", 1.0}});
+      of[i / 2] += file + " ";
+    }
+    const ToolRun run = lobecompare(of[0] + "--agree-with " + of[1]);
+    CHECK(run.code == 0);
+    CHECK(lineCount(run.error) == 1);
+    CHECK_THAT(run.error, Catch::Contains("note: ") && Catch::Contains("different scenes or cameras;"));
+    CHECK(lobecompare(a + "--agree-with " + of[0]).error.empty());
+  }
   SECTION("agreement") {
     const ToolRun run = lobecompare("--json " + a + "--agree-with " + b);
     REQUIRE(run.code == 0);
