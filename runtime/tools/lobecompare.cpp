@@ -1,12 +1,12 @@
 // lobecompare: measures the errors of images against a reference or the variance of a pair, merges or converts images.
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <set>
 #include <stdexcept>
 #include <string>
-#include <utility>
 #include <variant>
 #include <vector>
 
@@ -146,11 +146,17 @@ auto measured(const std::string& name, const Measure& measure) {
   }
 }
 
+/// The value of an attribute; null without one of this type.
+template <class Value>
+const Value* valueOf(const lobe::ImageAttributes& attributes, const char* key) {
+  const auto found = attributes.find(key);
+  return found == attributes.end() ? nullptr : std::get_if<Value>(&found->second);
+}
+
 /// Such pixels are black, whatever the expected value of the picture.
 void noteMissingSamples(const std::string& name) {
   const lobe::ImageAttributes attributes = lobe::readAttributes(name);
-  const auto found = attributes.find("interrupted");
-  const auto* samples = found == attributes.end() ? nullptr : std::get_if<std::string>(&found->second);
+  const auto* samples = valueOf<std::string>(attributes, "interrupted");
   if (samples && samples->starts_with("0 "))
     lobe::printNote("lobecompare", fmt::format("{}: its run was interrupted in the first pass, and it has {}; pixels "
                                                "without a sample are black",
@@ -247,12 +253,39 @@ bool noteDifferentScenes(const std::string& a, const std::string& b) {
   return noteDifferent(a, b, "sceneHash", "scenes or cameras");
 }
 
+/// The attribute as text; empty without it.
+std::string textOf(const lobe::ImageAttributes& attributes, const char* key) {
+  const auto* text = valueOf<std::string>(attributes, key);
+  return text ? *text : std::string();
+}
+
+/// What makes the variances of two pictures differ, as far as their attributes say. Pictures of other programs and PNG
+/// files have none.
+std::vector<std::string> differencesOf(const lobe::ImageAttributes& a, const lobe::ImageAttributes& b) {
+  constexpr double kEqual = 1.1;  // the ratio of numbers of samples up to which pictures may have taken equally long
+  std::vector<std::string> all;
+  if (a.empty() || b.empty()) return all;
+  const auto *m = valueOf<double>(a, "samples"), *n = valueOf<double>(b, "samples");
+  if (m && n && std::max(*m, *n) > kEqual * std::min(*m, *n)) all.push_back(fmt::format("{} and {} samples", *m, *n));
+  if (textOf(a, "interrupted") != textOf(b, "interrupted"))
+    all.emplace_back("different numbers of samples, because a run was interrupted");
+  if (textOf(a, "gradients") != textOf(b, "gradients")) all.emplace_back("different --gradients");
+  return all;
+}
+
+void noteDifferentVariances(const std::string& a, const std::string& b) {
+  for (const std::string& difference : differencesOf(lobe::readAttributes(a), lobe::readAttributes(b)))
+    lobe::printNote("lobecompare",
+                    fmt::format("{} and {}: have {}; the result is the mean of both variances", a, b, difference));
+}
+
 void comparePair(const Arguments& arguments) {
   const std::string& name = arguments.images[0];
   const lobe::Image a = lobe::readImage(arguments.reference), b = lobe::readImage(name);
   lobe::checkDifferentSeeds(arguments.reference, name);
   noteDifferentScenes(arguments.reference, name);
   noteDifferent(arguments.reference, name, "integrator", "integrators");
+  noteDifferentVariances(arguments.reference, name);
   for (const std::string& image : {arguments.reference, name}) noteMissingSamples(image);
   const lobe::PairVariance variance = measured(name, [&] { return lobe::comparePair(a, b); });
   arguments.json ? printJson(variance, arguments) : printTable(variance, arguments);

@@ -106,6 +106,34 @@ TEST_CASE("render: lobecompare --pair notes different scenes and integrators, an
                             Catch::Contains("different integrators;"));
 }
 
+TEST_CASE("render: lobecompare --pair notes what makes the variances of both pictures differ") {
+  const Folder folder;
+  const auto write = [&](const char* name, const ImageAttributes& attributes) {
+    const std::string path = folder / name;
+    writeImage(path, Image(4, 4, grey(0.5f)), attributes);
+    return path;
+  };
+  const std::string a = write("a.exr", {{"samples", 100.0}, {"seed", 1.0}}),
+                    similar = write("b.exr", {{"samples", 109.0}, {"seed", 2.0}}),
+                    more = write("c.exr", {{"samples", 112.0}, {"seed", 3.0}}),
+                    l2 = write("d.exr", {{"samples", 100.0}, {"gradients", "l2 (unbiased before clamping)"}}),
+                    partial = write("e.exr", {{"seed", 4.0}, {"interrupted", "1 to 2 samples per pixel"}}),
+                    png = write("f.png", {});
+  const auto notes = [&](const std::string& one, const std::string& other) {
+    const ToolRun run = lobecompare("--pair " + one + " " + other);
+    CHECK(run.code == 0);
+    return run.error;
+  };
+  const std::string end = "; the result is the mean of both variances\n";
+  CHECK(notes(a, similar).empty());
+  CHECK(notes(a, png).empty());
+  CHECK(notes(l2, l2).empty());
+  CHECK(notes(a, more) == "lobecompare: note: " + a + " and " + more + ": have 100 and 112 samples" + end);
+  CHECK_THAT(notes(a, l2), Catch::Contains("have different --gradients" + end));
+  CHECK_THAT(notes(a, partial),
+             Catch::Contains("have different numbers of samples, because a run was interrupted" + end));
+}
+
 TEST_CASE("render: lobecompare notes pixels without samples") {
   const Folder folder;
   const std::string whole = folder / "whole.exr", later = folder / "later.exr", first = folder / "first.exr";
