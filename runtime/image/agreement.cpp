@@ -124,7 +124,7 @@ Agreement testAgreement(std::span<const WeightedPicture> a, std::span<const Weig
   const double level = -std::expm1(std::log1p(-kAgreementLevel) / static_cast<double>(result.blocks + 1));
   result.limitZ = deviateOf(level);
   result.agree = result.worstZ <= result.limitZ && std::abs(result.z) <= result.limitZ;
-  const double mean = ofA.back().mean;
+  const double mean = ofA.back().mean == 0 ? std::numeric_limits<double>::quiet_NaN() : ofA.back().mean;
   result.meanRatio = ofB.back().mean / mean;
   result.meanRatioError =
       std::sqrt(ofB.back().variance + result.meanRatio * result.meanRatio * ofA.back().variance) / mean;

@@ -26,9 +26,9 @@ inline constexpr double kAgreementLevel = 0.001;  ///< probability with which me
 struct Agreement {
   bool agree = false;
   double meanRatio = 0;       ///< mean(b) / mean(a); NaN if a is black
-  double meanRatioError = 0;  ///< its standard error
+  double meanRatioError = 0;  ///< its standard error; NaN if a is black
   double z = 0;               ///< of the whole picture, b − a
-  double worstZ = 0;          ///< the largest |z| of a block
+  double worstZ = 0;          ///< the largest |z| of a block; infinite if no picture varies
   double limitZ = 0;          ///< the largest |z| of a block that is accepted
   std::size_t blocks = 0;
   int worstX = 0, worstY = 0;  ///< the top left pixel of the worst block

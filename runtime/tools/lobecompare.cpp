@@ -192,13 +192,19 @@ void printJson(const std::vector<Comparison>& comparisons) {
   fmt::print("{}\n", lobe::jsonText(array));
 }
 
+/// The text of a value; a dash if it is NaN.
+std::string orDash(double value, const std::string& text) {
+  return std::isnan(value) ? "–" : text;
+}
+
 void printTable(const std::vector<Comparison>& comparisons) {
   lobe::Table table({"image", "mse", "relmse", "without worst 0.1 %", "without worst 1 %", "ratio of means",
                      "non-finite", "worst 0.01 / 0.1 / 1 % of the error", "fireflies"});
   for (const auto& [image, m] : comparisons)
-    table.add({image, fmt::format("{:.6g}", m.mse), fmt::format("{:.6g} ± {:.2g}", m.relmse, m.relmseError),
+    table.add({image, fmt::format("{:.6g}", m.mse),
+               fmt::format("{:.6g} ± {}", m.relmse, orDash(m.relmseError, fmt::format("{:.2g}", m.relmseError))),
                fmt::format("{:.6g}", m.relmseDrop01), fmt::format("{:.6g}", m.relmseDrop1),
-               fmt::format("{:.5f}", m.meanRatio), fmt::format("{}", m.nonfinite),
+               orDash(m.meanRatio, fmt::format("{:.5f}", m.meanRatio)), fmt::format("{}", m.nonfinite),
                fmt::format("{:.0f} / {:.0f} / {:.0f} %", 100 * m.worst.fraction001, 100 * m.worst.fraction01,
                            100 * m.worst.fraction1),
                fmt::format("{}", m.fireflies)});
@@ -225,14 +231,15 @@ void printJson(const lobe::PairVariance& v, const Arguments& arguments) {
 }
 
 std::string textOf(const lobe::MeanEstimate& e) {
-  return fmt::format("{:.6g} [{:.4g}, {:.4g}]", e.value, e.interval.low, e.interval.high);
+  const std::string interval = fmt::format("{:.4g}, {:.4g}", e.interval.low, e.interval.high);
+  return fmt::format("{} [{}]", orDash(e.value, fmt::format("{:.6g}", e.value)), orDash(e.interval.low, interval));
 }
 
 void printTable(const lobe::PairVariance& v, const Arguments& arguments) {
   lobe::Table table({"images", "relative variance [95 %]", "without worst 0.1 %", "without worst 1 %", "ratio of means",
                      "non-finite"});
   table.add({arguments.reference + ", " + arguments.images[0], textOf(v.all), textOf(v.drop01), textOf(v.drop1),
-             fmt::format("{:.5f}", v.meanRatio), fmt::format("{}", v.nonfinite)});
+             orDash(v.meanRatio, fmt::format("{:.5f}", v.meanRatio)), fmt::format("{}", v.nonfinite)});
   table.print(stdout);
 }
 
@@ -307,10 +314,11 @@ std::vector<lobe::WeightedPicture> readPictures(const std::vector<std::filesyste
 }
 
 void printAgreement(const lobe::Agreement& a) {
+  const std::string ratio = fmt::format("{:.5f} ± {:.2g}", a.meanRatio, a.meanRatioError);
   fmt::print(
-      "{}: ratio of means {:.5f} ± {:.2g}, z {:.2f}; worst z {:.2f} of {} blocks of {}x{} pixels, at {},{}; "
+      "{}: ratio of means {}, z {:.2f}; worst z {:.2f} of {} blocks of {}x{} pixels, at {},{}; "
       "limit {:.2f}\n",
-      a.agree ? "agree" : "disagree", a.meanRatio, a.meanRatioError, a.z, a.worstZ, a.blocks, lobe::kAgreementBlock,
+      a.agree ? "agree" : "disagree", orDash(a.meanRatio, ratio), a.z, a.worstZ, a.blocks, lobe::kAgreementBlock,
       lobe::kAgreementBlock, a.worstX, a.worstY, a.limitZ);
 }
 

@@ -106,6 +106,36 @@ TEST_CASE("render: lobecompare --pair notes different scenes and integrators, an
                             Catch::Contains("different integrators;"));
 }
 
+TEST_CASE("render: lobecompare prints a dash, or null in JSON, for what is not known") {
+  const Folder folder;
+  std::string black[4], bright[2];
+  const auto write = [&](const char* name, int seed, const Image& image) {
+    const std::string path = folder / fmt::format("{}-{}.exr", name, seed);
+    writeImage(path, image, {{"integrator", "path"}, {"seed", 1.0 * seed}, {"samples", 1.0}});
+    return path;
+  };
+  for (int i = 0; i < 4; ++i) black[i] = write("black", i, Image(16, 10));
+  for (int i = 0; i < 2; ++i) bright[i] = write("bright", 4 + i, Image(16, 10, grey(1)));
+  const std::string small = write("small", 6, Image(1, 1, grey(1)));
+  const auto shown = [](const std::string& arguments) {
+    const ToolRun run = lobecompare(arguments);
+    CHECK(run.code == 0);
+    CHECK_THAT(run.out, !Catch::Contains("nan"));
+    return run.out;
+  };
+  CHECK_THAT(shown("--pair " + bright[0] + " " + bright[1]), Catch::Contains("0 [–]"));
+  CHECK_THAT(shown("--pair " + black[0] + " " + black[1]), Catch::Contains("–  "));
+  CHECK_THAT(shown(small + " " + small), Catch::Contains("0 ± –"));
+  CHECK_THAT(shown(black[0] + " " + black[1]), Catch::Contains(" –  "));
+  const std::string agreement = black[0] + " " + black[1] + " --agree-with " + black[2] + " " + black[3];
+  CHECK_THAT(shown(agreement), Catch::Contains("agree: ratio of means –, z 0.00;"));
+  const std::string other = black[0] + " " + black[1] + " --agree-with " + bright[0] + " " + bright[1];
+  CHECK_THAT(shown(other), Catch::Contains("disagree: ratio of means –, z inf;"));
+  CHECK(parseJson(shown("--json " + other))["mean_ratio"].is_null());
+  CHECK(parseJson(shown("--json --pair " + bright[0] + " " + bright[1]))["relvar_interval"][0].is_null());
+  CHECK(parseJson(shown("--json " + small + " " + small))[0]["relmse_error"].is_null());
+}
+
 TEST_CASE("render: lobecompare --pair notes what makes the variances of both pictures differ") {
   const Folder folder;
   const auto write = [&](const char* name, const ImageAttributes& attributes) {
