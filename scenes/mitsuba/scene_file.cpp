@@ -307,10 +307,14 @@ void SceneFile::reportUndefined(const std::string& name, std::ptrdiff_t location
 
 void SceneFile::checkDefinitionsUsed(const std::map<std::string, std::string>& definitions,
                                      const SceneFile* other) const {
-  for (const auto& [name, value] : definitions)
-    if (!uses(name) && !(other && other->uses(name)))
-      fail(scene_, fmt::format("-D defines ${}, which the scene does not use; it uses {}", name,
-                               usedNames_.empty() ? "none" : listed(usedNames_)));
+  const auto used = [](const SceneFile& file) { return file.usedNames_.empty() ? "none" : listed(file.usedNames_); };
+  for (const auto& [name, value] : definitions) {
+    if (uses(name) || (other && other->uses(name))) continue;
+    if (!other)
+      fail(scene_, fmt::format("-D defines ${}, which the scene does not use; it uses {}", name, used(*this)));
+    fail(scene_, fmt::format("-D defines ${}, which neither file uses; {} uses {}, and {} uses {}", name,
+                             files_[0].path.string(), used(*this), other->files_[0].path.string(), used(*other)));
+  }
 }
 
 bool SceneFile::hasUndefinedName(pugi::xml_node node) {
