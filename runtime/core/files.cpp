@@ -1,5 +1,6 @@
 #include "runtime/core/files.h"
 
+#include <cctype>
 #include <cerrno>
 #include <system_error>
 
@@ -25,6 +26,12 @@ std::string readFile(const std::filesystem::path& path) {
   std::string bytes(std::filesystem::file_size(path), '\0');
   if (!file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()))) throw std::runtime_error("cannot read");
   return bytes;
+}
+
+std::string extensionOf(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return extension;
 }
 
 std::uint64_t contentHash(std::string_view bytes) {

@@ -46,6 +46,9 @@ auto nameErrors(const std::filesystem::path& path, Read&& read) {
   }
 }
 
+/// The end of the name from the last dot on, in lower case; empty without a dot.
+std::string extensionOf(const std::filesystem::path& path);
+
 /// XXH3-64 of the bytes.
 std::uint64_t contentHash(std::string_view bytes);
 

@@ -34,12 +34,6 @@
 namespace lobe {
 namespace {
 
-std::string extensionOf(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension;
-}
-
 std::vector<std::uint8_t> encodePixels(const Image& image) {
   std::vector<std::uint8_t> bytes;
   bytes.reserve(3 * image.pixels.size());

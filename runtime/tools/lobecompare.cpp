@@ -14,6 +14,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "runtime/core/files.h"
 #include "runtime/image/agreement.h"
 #include "runtime/image/error_map.h"
 #include "runtime/image/error_metrics.h"
@@ -105,16 +106,16 @@ std::vector<std::filesystem::path> all(const Arguments& arguments) {
 }
 
 void checkMerge(const Arguments& arguments) {
-  if (std::filesystem::path(arguments.merge).extension() != ".exr")
+  if (lobe::extensionOf(arguments.merge) != ".exr")
     throw lobe::UsageError("--merge must name an .exr file, because it stores the number of samples");
-  if (!arguments.variance.empty() && std::filesystem::path(arguments.variance).extension() != ".exr")
+  if (!arguments.variance.empty() && lobe::extensionOf(arguments.variance) != ".exr")
     throw lobe::UsageError("--variance must name an .exr file");
 }
 
 void checkPng(const Arguments& arguments) {
   if (arguments.images.size() != 1) throw lobe::UsageError("--png takes two files, the input and the output");
   const std::filesystem::path output = arguments.images.front();
-  if (output.extension() != ".png")
+  if (lobe::extensionOf(output) != ".png")
     throw lobe::UsageError(fmt::format("{}: --png writes its second file, which must be a .png file", output.string()));
   lobe::checkOutputs({output}, {arguments.reference});
 }
@@ -133,7 +134,7 @@ void checkArguments(const Arguments& arguments) {
   lobe::checkOutputs({arguments.merge, arguments.variance, arguments.map}, all(arguments));
   if (arguments.map.empty()) return;
   if (arguments.images.size() > 1) throw lobe::UsageError("--map takes one image, but several are given");
-  if (std::filesystem::path(arguments.map).extension() != ".png") throw lobe::UsageError("--map must name a .png file");
+  if (lobe::extensionOf(arguments.map) != ".png") throw lobe::UsageError("--map must name a .png file");
 }
 
 /// Adds the name of the image to the message of an error.

@@ -7,6 +7,7 @@
 
 #include "fitter/compile.h"
 #include "runtime/core/atomic_file.h"
+#include "runtime/core/files.h"
 #include "runtime/tools/cache_diff.h"
 #include "runtime/tools/cache_grid.h"
 #include "runtime/tools/cache_page.h"
@@ -96,20 +97,18 @@ void validate(const Options& o) {
   if (o.diff && o.files.size() != 2) throw UsageError("--diff needs two cache files");
   if (!o.points.empty()) {
     if (o.files.size() != 1) throw UsageError("--points needs exactly one .illum file");
-    if (std::filesystem::path(o.points).extension() != ".ply")
-      throw UsageError(fmt::format("--points {}: must be a .ply file", o.points));
+    if (extensionOf(o.points) != ".ply") throw UsageError(fmt::format("--points {}: must be a .ply file", o.points));
   }
   if (!o.scene.empty() && o.plot.empty() && o.html.empty()) throw UsageError("--scene needs --plot or --html");
   if (!o.read.definitions.empty() && o.scene.empty()) throw UsageError("-D needs --scene");
   std::vector<std::filesystem::path> inputs(o.files.begin(), o.files.end());
   inputs.emplace_back(o.scene);
   checkOutputs({o.points, o.plot, o.html}, inputs);
-  if (!o.html.empty() && std::filesystem::path(o.html).extension() != ".html")
+  if (!o.html.empty() && extensionOf(o.html) != ".html")
     throw UsageError(fmt::format("--html {}: must be an .html file", o.html));
   if (o.plot.empty()) return;
   if (o.files.size() != 1) throw UsageError("--plot needs exactly one cache file");
-  if (std::filesystem::path(o.plot).extension() != ".png")
-    throw UsageError(fmt::format("--plot {}: must be a .png file", o.plot));
+  if (extensionOf(o.plot) != ".png") throw UsageError(fmt::format("--plot {}: must be a .png file", o.plot));
 }
 
 // ---- Tables

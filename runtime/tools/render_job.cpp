@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "runtime/core/files.h"
 #include "runtime/image/image_output.h"
 #include "runtime/tools/exr_options.h"
 #include "runtime/tools/tool.h"
@@ -93,7 +94,7 @@ void RenderJob::validate() const {
   require(resume.empty() || !record, "--record cannot be combined with --resume, because the particles are not stored");
   require(resume.empty() || convergence.empty(),
           "--convergence cannot be combined with --resume, because the earlier errors are not stored");
-  require(recordImage.extension() == ".png", "--record-image must name a .png file");
+  require(extensionOf(recordImage) == ".png", "--record-image must name a .png file");
   try {
     training.validate();
     for (const auto& output : outputs) checkImageName(output);

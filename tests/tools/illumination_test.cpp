@@ -272,6 +272,7 @@ TEST_CASE("lobedump: shows illumination as text and JSON and as a point cloud") 
   CHECK(lineCount(folder.run("lobedump --records a.illum").out) == lineCount(text.out) + records + 1);
 
   REQUIRE(folder.run("lobedump a.illum --points p.ply").code == 0);
+  CHECK(folder.run("lobedump a.illum --points upper.PLY").code == 0);
   const std::string ply = folder.bytes("p.ply"), end = "end_header\n";
   CHECK_THAT(ply, Catch::StartsWith("ply\n") && Catch::Contains("element vertex " + std::to_string(records) + "\n"));
   CHECK(ply.size() == ply.find(end) + end.size() + static_cast<std::size_t>(records) * 10 * sizeof(float));

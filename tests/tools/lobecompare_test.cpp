@@ -228,6 +228,19 @@ TEST_CASE("render: lobecompare --png writes the picture as loberender does") {
   }
 }
 
+TEST_CASE("render: lobecompare accepts extensions in upper case") {
+  const Folder folder;
+  const std::string a = folder / "a.EXR", b = folder / "b.exr", merged = folder / "m.EXR", variance = folder / "v.EXR",
+                    map = folder / "map.PNG", png = folder / "p.PNG";
+  writeImage(a, Image(2, 2, grey(1)), {{"samples", 1.0}});
+  writeImage(b, Image(2, 2, grey(1)), {{"samples", 3.0}});
+  CHECK(lobecompare("--merge " + merged + " --variance " + variance + " " + a + " " + b).code == 0);
+  CHECK(lobecompare(a + " " + b + " --map " + map).code == 0);
+  CHECK(lobecompare("--png " + a + " " + png).code == 0);
+  CHECK(readImage(merged).width == 2);
+  CHECK(folder.files() == 6);
+}
+
 TEST_CASE("render: lobecompare --merge writes halves") {
   const Folder folder;
   const std::string a = folder / "a.exr", b = folder / "b.exr", merged = folder / "merged.exr";

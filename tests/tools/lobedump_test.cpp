@@ -268,6 +268,8 @@ TEST_CASE("fitter: lobedump --plot draws fits and with --scene also targets") {
   CHECK((image.width == 752 && image.height > 256));
   CHECK(folder.run("lobedump --plot again.png --scene scene.xml other.lobe --record 7").code == 0);
   CHECK(readFile(folder / "all.png") == readFile(folder / "again.png"));
+  CHECK(folder.run("lobedump --plot upper.PNG good.lobe").code == 0);
+  CHECK(folder.run("lobedump --html upper.HTML good.lobe").code == 0);
 }
 
 TEST_CASE("fitter: lobedump --plot leaves out records without a fit") {

@@ -488,6 +488,7 @@ TEST_CASE("loberender: --record plots the record used at a pixel") {
       for (int x = column * image.width / 3; x < (column + 1) * image.width / 3; ++x) greens.insert(image.at(x, y).y());
     CHECK(greens.size() > 5);
   }
+  CHECK(folder.run(guided + " --record 8,11 --record-image floor.PNG").code == 0);
   CHECK(folder.run(guided + " --record 8,11").code == 0);
   CHECK(folder.has("record.png"));
 }
