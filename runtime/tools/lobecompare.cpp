@@ -49,7 +49,8 @@ void declare(CLI::App& app, Arguments& arguments) {
       ->required()
       ->type_name("FILE");
   // Its number is checked later: if it was required here, it would take the last image of --agree-with.
-  app.add_option("IMAGE", arguments.images, "Images of the same size as the reference; with --png, the output")
+  app.add_option("IMAGE", arguments.images,
+                 "Images of the same size as the reference, at least one; with --png, the output")
       ->type_name("FILE")
       ->default_str("");
   auto* json = app.add_flag("--json", arguments.json, "Print the errors as JSON");

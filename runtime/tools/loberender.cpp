@@ -149,10 +149,13 @@ void declare(CLI::App& app, Options& options) {
   app.add_option("--camera", job.camera,
                  "Take the sensor, with its film, from this scene file instead of the scene's own")
       ->type_name("FILE.xml");
-  app.add_option("-o,--output", job.outputs, "Output picture, .exr or .png (repeatable)")
+  // A vector would be shown as "FILE ...", as if one -o took several files.
+  app.add_option_function<std::string>(
+         "-o,--output", [&job](const std::string& file) { job.outputs.emplace_back(file); },
+         "Output picture, .exr or .png (repeatable: one file each)")
       ->type_name("FILE")
-      ->default_str("")
-      ->allow_extra_args(false);  // otherwise it would take the scene after it as another picture
+      ->trigger_on_parse()
+      ->allow_extra_args(false);
   auto* aovs =
       app.add_option("--aov", options.aovs,
                      fmt::format("AOVs that are stored with the picture in .exr files, separated by commas: {}, or all",

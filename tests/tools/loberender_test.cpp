@@ -190,6 +190,16 @@ TEST_CASE("loberender: invalid command lines are errors") {
   fault(folder, "loberender scene.xml --spp 1", 2);
 }
 
+TEST_CASE("loberender: every -o takes one file") {
+  const SceneFolder folder(false);
+  const std::string help = folder.run("loberender --help").out;
+  CHECK_THAT(help, Catch::Contains("-o,--output FILE  ") && Catch::Contains("(repeatable: one file each)"));
+  CHECK(folder.run("loberender -o a.exr --output=b.png -o c.exr scene.xml --spp 1 --integrator path").code == 0);
+  for (const char* name : {"a.exr", "b.png", "c.exr"}) CHECK(folder.has(name));
+  CHECK_THAT(fault(folder, "loberender scene.xml --spp 1 --integrator path -o d.exr e.exr", 2),
+             Catch::Contains("e.exr"));
+}
+
 TEST_CASE("loberender: output files that cannot be written are reported before rendering") {
   const SceneFolder folder(false);
   folder.write("reference.exr", "not read yet");
