@@ -216,7 +216,10 @@ int runTool(const std::string& name, std::string_view description, int argc, cha
   } catch (const std::bad_alloc&) {
     return fail(name, "out of memory", 1);
   } catch (const std::system_error& e) {
-    return e.code() == std::errc::broken_pipe ? endWithReader() : fail(name, e.what(), 1);
+    if (e.code() == std::errc::broken_pipe) return endWithReader();
+    // The message of fmt::print does not name the file; the tools print to no other one.
+    const bool isOutput = std::ferror(stdout) != 0;
+    return fail(name, isOutput ? "cannot write to standard output: " + e.code().message() : e.what(), 1);
   } catch (const std::exception& e) {
     return fail(name, e.what(), 1);
   }

@@ -127,7 +127,14 @@ TEST_CASE("tools: help and results that cannot be printed are errors") {
       CHECK(runIn(folder, kBin + tool + option + " >&- 2>/dev/null") == "1");
       CHECK(runIn(folder, kBin + tool + option + " >/dev/null") == "0");
     }
-  CHECK(runIn(folder, kBin + "lobedump lobes/*.lobe >/dev/full 2>/dev/null") == "1");
+  // Longer output fails when it is printed, shorter output at the end.
+  for (const std::string arguments :
+       {"lobedump lobes/*.lobe", "lobedump --json lobes/*.lobe lobes/*.lobe lobes/*.lobe lobes/*.lobe lobes/*.lobe",
+        "lobefit scene.xml --elevations 4 --samples 256 --json"}) {
+    CAPTURE(arguments);
+    CHECK(runIn(folder, kBin + arguments + " >/dev/full 2>error") == "1");
+    CHECK_THAT(folder.bytes("error"), Contains(": error: cannot write to standard output: No space left on device\n"));
+  }
 }
 
 TEST_CASE("tools: end quietly when the reader of their output has ended") {
