@@ -18,6 +18,7 @@
 #include "runtime/tools/tool.h"
 #include "scenes/mitsuba/reader.h"
 #include "scenes/scene_lobes.h"
+#include "schema/checkpoint_file.h"
 
 namespace {
 
@@ -247,8 +248,12 @@ void runPage(const std::vector<LobeCache>& caches, Options& o) {
 
 // ---- Illumination
 
+/// Checkpoints contain illumination, but are files of loberender only.
 bool isIllumination(const std::string& file) {
-  return isOfKind(kIlluminationFormat, FileContent(file).bytes());
+  const FileContent content(file);
+  if (isOfKind(kCheckpointFormat, content.bytes()))
+    throw std::runtime_error(fmt::format("{}: a checkpoint; lobedump reads .lobe and .illum files", file));
+  return isOfKind(kIlluminationFormat, content.bytes());
 }
 
 void validateForIllumination(const Options& o) {

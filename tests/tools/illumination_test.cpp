@@ -282,6 +282,10 @@ TEST_CASE("lobedump: shows illumination as text and JSON and as a point cloud") 
   CHECK(folder.run("lobedump --points p.ply " + lobe).code == 2);
   CHECK(folder.run("lobedump --points p.obj a.illum").code == 2);
   CHECK(folder.run("lobedump --diff a.illum a.illum").code == 2);
+  REQUIRE(folder.run("loberender scene.xml -o a.exr --integrator path --spp 1 --checkpoint run.ckpt").code == 0);
+  for (const std::string arguments : {"run.ckpt", "a.illum run.ckpt", "--diff run.ckpt run.ckpt"})
+    CHECK_THAT(folder.run("lobedump " + arguments).error,
+               Catch::Contains("run.ckpt: a checkpoint; lobedump reads .lobe and .illum files"));
   CHECK(folder.run("lobedump gone.illum").code == 1);
 
   CHECK(folder.run("lobedump --html light.html a.illum").code == 0);
