@@ -66,8 +66,8 @@ std::string page(const char* kind, const Json& files) {
                   {"diverging", colours(divergingColour, -1, 1)},
                   {"files", files}};
   std::string json = jsonText(data, -1);
-  // In a script element, "</" would end it.
-  for (std::size_t at = 0; (at = json.find("</", at)) != std::string::npos; at += 3) json.replace(at, 2, "<\\/");
+  // "</script" would end the script element, and "<!--<script" would hide its end. Only strings contain a "<".
+  for (std::size_t at = 0; (at = json.find('<', at)) != std::string::npos;) json.replace(at, 1, "\\u003c");
   std::string text = kCachePage;
   constexpr std::string_view kPlace = "/* DATA */ null";
   return text.replace(text.find(kPlace), kPlace.size(), json);

@@ -333,6 +333,11 @@ TEST_CASE("fitter: lobedump --html writes a page that needs nothing else") {
   CHECK_THAT(page, !Catch::Contains("://") && !Catch::Contains(" src="));
   CHECK(folder.run("lobedump --html again.html --scene scene.xml good.lobe other.lobe").code == 0);
   CHECK(readFile(folder / "again.html") == page);
+  // Names of files must not look like elements within the script.
+  fs::copy_file(folder / "good.lobe", folder / "a<!--<script>.lobe");
+  CHECK(folder.run("lobedump --html odd.html 'a<!--<script>.lobe'").code == 0);
+  const std::string odd = readFile(folder / "odd.html");
+  CHECK_THAT(odd, Catch::Contains("a\\u003c!--\\u003cscript>.lobe") && !Catch::Contains("<!--<script"));
   // Without a scene there are no targets.
   CHECK(folder.run("lobedump --html fits.html good.lobe other.lobe").code == 0);
   CHECK(readFile(folder / "fits.html").size() < page.size() / 2);
