@@ -393,6 +393,7 @@ TEST_CASE("loberender: auto compares integrators in the course of a training of 
   CHECK(early.at("nonfinite_samples") == 0);
   const auto limited = statistics(" --passes 1 --photons 3000 --importons 2000");
   CHECK(limited.at("training_passes").size() == 1);
+  CHECK(limited.at("training_passes")[0].at("log_likelihood").is_null());  // there were no records before
   CHECK(limited.at("pilot").at("path").at("variance") > 0);
 }
 
