@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "fitter/compile.h"
+#include "runtime/core/parallel.h"
 
 namespace lobe {
 namespace {
@@ -96,7 +97,7 @@ CompiledLobe compileLobe(const LobeFunctions& lobe, const FittingOptions& option
   compile.settings.components = static_cast<std::uint32_t>(options.components);
   const CompileJob job = planCompile({{std::make_shared<HostLobe>(lobe), {}}}, compile).front();
   if (!job.upToDate) {
-    const FittedGrid fit = fitForFile(job, {});
+    const FittedGrid fit = isolated([&] { return fitForFile(job, {}); });
     checkSampled(lobe, fit.records);
     writeCompiled(job, fit);
   }

@@ -7,6 +7,7 @@ import sys
 
 import results
 from commands import output
+from scenes import name_of_file
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 KEPT = ROOT / "build/bench"
@@ -50,9 +51,7 @@ def scene_file(name):
 
 
 def label_of(name):
-    """As scripts/make-references names scenes."""
-    path = pathlib.Path(name)
-    return name if path.suffix != ".xml" else path.resolve().parent.name if path.stem == "scene" else path.stem
+    return name_of_file(pathlib.Path(name)) if name.endswith(".xml") else name
 
 
 def parse(parser):

@@ -30,6 +30,11 @@ def is_own(name):
     return name == "jewelry" or name.startswith("own-")
 
 
+def name_of_file(path):
+    """The name of a scene file, or that of its folder for scene.xml."""
+    return path.resolve().parent.name if path.stem == "scene" else path.stem
+
+
 def scene_file(name):
     if is_own(name):
         return ROOT / "scenes" / (name.removeprefix("own-") + ".xml")

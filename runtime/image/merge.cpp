@@ -106,10 +106,11 @@ Part describe(const std::filesystem::path& path) {
         fmt::format("{}: does not say how many samples it has, as .exr files written by loberender do", path.string()));
   const auto gradients = find<std::string>(part.attributes, "gradients");
   if (gradients && gradients->starts_with("l1"))
-    throw std::runtime_error(fmt::format(
-        "{}: pictures of --gradients l1 cannot be merged, because their mean keeps the bias of few samples; "
-        "render all samples in one run, or with --gradients l2",
-        path.string()));
+    throw std::runtime_error(
+        fmt::format("{}: pictures of --gradients l1 cannot be merged or tested for agreement, because their mean keeps "
+                    "the bias of few samples; "
+                    "render all samples in one run, or with --gradients l2",
+                    path.string()));
   part.samples = static_cast<double>(*samples);
   part.ranges = rangesOf(path, part.attributes);
   return part;

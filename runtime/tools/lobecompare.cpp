@@ -48,7 +48,7 @@ void declare(CLI::App& app, Arguments& arguments) {
                  "Reference image; with --merge or --pair, the first of the images; with --png, the input")
       ->required()
       ->type_name("FILE");
-  // Its number is checked later: if it was required here, it would take the last image of --agree-with.
+  // Its number is checked later: if it were required here, it would take the last image of --agree-with.
   app.add_option("IMAGE", arguments.images,
                  "Images of the same size as the reference, at least one; with --png, the output")
       ->type_name("FILE")

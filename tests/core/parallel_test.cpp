@@ -21,7 +21,7 @@ void await(const Condition& condition) {
 
 TEST_CASE("core: a thread that waits in an isolated function runs no tasks from outside of it") {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 3);
-  std::atomic<int> iterations = 0, outside = 0;
+  std::atomic<int> iterations = 0, others = 0, outside = 0;
   std::atomic<bool> inside = true, started = false, spawned = false;
   tbb::task_arena(3).execute([&] {
     const std::thread::id caller = std::this_thread::get_id();
@@ -40,8 +40,10 @@ TEST_CASE("core: a thread that waits in an isolated function runs no tasks from 
       parallelForEach(0, 2, [&](int) {
         ++iterations;
         await([&] { return spawned.load(); });
-        // The caller now waits for the other thread.
-        if (std::this_thread::get_id() != caller) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        if (std::this_thread::get_id() == caller) return;
+        ++others;
+        // The caller now waits for this thread.
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
       });
       return 7;
     });
@@ -50,6 +52,7 @@ TEST_CASE("core: a thread that waits in an isolated function runs no tasks from 
     CHECK(result == 7);
   });
   CHECK(iterations == 2);
+  CHECK(others == 1);
   CHECK(outside == 0);
 }
 

@@ -12,7 +12,6 @@ import getpass
 import json
 import os
 import pathlib
-import shlex
 import shutil
 import signal
 import socket

@@ -207,6 +207,14 @@ TEST_CASE("tools: outputs are not written through names of open files") {
   CHECK_FALSE(folder.has("a.exr"));
 }
 
+TEST_CASE("tools: outputs are written to /dev/shm") {
+  if (!fs::is_directory("/dev/shm")) return;
+  const SceneFolder folder(false);
+  const std::string picture = fmt::format("/dev/shm/lobe-test-{}.exr", getpid());
+  CHECK(runIn(folder, kBin + kPath + " --spp 1 -o " + picture) == "0");
+  CHECK(fs::remove(picture));
+}
+
 TEST_CASE("loberender: outputs beyond the file size limit are errors, and leave no temporary files") {
   const SceneFolder folder(true);
   // The limit lets the statistics through, but neither the pictures nor the illumination.

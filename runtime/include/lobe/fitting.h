@@ -64,12 +64,12 @@ struct CompiledLobe {
   float worstRelativeVariance;  ///< largest relative variance of all records, as defined by FittingOptions::quality
 };
 
-/// Fits the lobe in parallel (TBB) and writes its cache file atomically; does nothing if the file is up to date. The
-/// bytes of the file do not depend on the number of threads. The records of a lobe that reflects nothing or is too
-/// narrow for Gaussians have no components; guiding then leaves the lobe to BSDF sampling. Throws std::runtime_error
-/// that names the lobe, field or file if a field or option is invalid, if a function returns a value out of range, if
-/// `sample` draws nothing although `evaluate` is positive, or if the file cannot be written; no file is written then.
-/// Exceptions of the functions are thrown again.
+/// Fits the lobe in parallel (oneTBB; as with Field, a waiting thread runs no other tasks of the host) and writes its
+/// cache file atomically; does nothing if the file is up to date. The bytes of the file do not depend on the number
+/// of threads. The records of a lobe that reflects nothing or is too narrow for Gaussians have no components; guiding
+/// then leaves the lobe to BSDF sampling. Throws std::runtime_error that names the lobe, field or file if a field or
+/// option is invalid, if a function returns a value out of range, if `sample` draws nothing although `evaluate` is
+/// positive, or if the file cannot be written; no file is written then. Exceptions of the functions are thrown again.
 CompiledLobe compileLobe(const LobeFunctions& lobe, const FittingOptions& options = {});
 
 }  // namespace lobe
