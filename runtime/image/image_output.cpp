@@ -52,7 +52,7 @@ Imf::Header makeHeader(const Image& image, const ImageAttributes& attributes, co
   Imf::Header header(image.width, image.height);
   header.compression() = codeOf(format.compression);
   for (const auto& [name, value] : attributes) {
-    if (const auto* text = std::get_if<std::string>(&value))
+    if (const auto* text = std::get_if<AttributeText>(&value))
       header.insert(name, Imf::StringAttribute(*text));
     else
       header.insert(name, Imf::DoubleAttribute(std::get<double>(value)));

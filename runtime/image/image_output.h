@@ -6,6 +6,7 @@
 #include <map>
 #include <span>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -13,9 +14,16 @@
 
 namespace lobe {
 
+/// The text of an attribute. A type of its own, because the std::variant of libstdc++ 12 takes std::string for a type
+/// whose construction leaves it with a value: if copying such a variant fails, it destroys a string that is not there.
+struct AttributeText : std::string {
+  using std::string::string;
+  AttributeText(std::string text) : std::string(std::move(text)) {}
+};
+
 /// Attributes of an image file by name. Equal images with equal attributes give identical files, so reproducible files
 /// must not contain times.
-using ImageAttributes = std::map<std::string, std::variant<std::string, double>>;
+using ImageAttributes = std::map<std::string, std::variant<AttributeText, double>>;
 
 /// How pixels are stored in an .exr file.
 struct ExrFormat {

@@ -97,14 +97,14 @@ Part describe(const std::filesystem::path& path) {
   if (!std::filesystem::exists(path, error) && !error) throw std::runtime_error(path.string() + ": no such file");
   Part part{path, readAttributes(path), 0, {}};
   const std::optional<std::uint64_t> samples = findCount(part.attributes, "samples");
-  if (const auto interrupted = find<std::string>(part.attributes, "interrupted"))
+  if (const auto interrupted = find<AttributeText>(part.attributes, "interrupted"))
     throw std::runtime_error(fmt::format(
         "{}: the run was interrupted and its pixels have {}; complete it with loberender --resume, or render it again",
         path.string(), *interrupted));
   if (!samples || *samples == 0)
     throw std::runtime_error(
         fmt::format("{}: does not say how many samples it has, as .exr files written by loberender do", path.string()));
-  const auto gradients = find<std::string>(part.attributes, "gradients");
+  const auto gradients = find<AttributeText>(part.attributes, "gradients");
   if (gradients && gradients->starts_with("l1"))
     throw std::runtime_error(
         fmt::format("{}: pictures of --gradients l1 cannot be merged or tested for agreement, because their mean keeps "
@@ -118,7 +118,8 @@ Part describe(const std::filesystem::path& path) {
 
 /// Images without the attribute sceneHash are accepted.
 void checkSameScene(const Part& a, const Part& b) {
-  const auto one = find<std::string>(a.attributes, "sceneHash"), other = find<std::string>(b.attributes, "sceneHash");
+  const auto one = find<AttributeText>(a.attributes, "sceneHash"),
+             other = find<AttributeText>(b.attributes, "sceneHash");
   if (one && other && *one != *other)
     throw std::runtime_error(
         fmt::format("{} and {}: renders of different scenes or cameras cannot be merged (sceneHash {} and {})",
@@ -305,8 +306,8 @@ class Merger {
 }  // namespace
 
 std::vector<SampleRange> sampleRanges(const ImageAttributes& attributes) {
-  if (const auto text = find<std::string>(attributes, "sampleRanges")) return parseRanges(*text);
-  const auto integrator = find<std::string>(attributes, "integrator");
+  if (const auto text = find<AttributeText>(attributes, "sampleRanges")) return parseRanges(*text);
+  const auto integrator = find<AttributeText>(attributes, "integrator");
   const auto seed = findCount(attributes, "seed"), samples = findCount(attributes, "samples");
   if (!integrator || !seed || !samples) return {};
   const std::uint64_t first = findCount(attributes, "sampleOffset").value_or(0);

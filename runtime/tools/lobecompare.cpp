@@ -158,7 +158,7 @@ const Value* valueOf(const lobe::ImageAttributes& attributes, const char* key) {
 /// Such pixels are black, whatever the expected value of the picture.
 void noteMissingSamples(const std::string& name) {
   const lobe::ImageAttributes attributes = lobe::readAttributes(name);
-  const auto* samples = valueOf<std::string>(attributes, "interrupted");
+  const auto* samples = valueOf<lobe::AttributeText>(attributes, "interrupted");
   if (samples && samples->starts_with("0 "))
     lobe::printNote("lobecompare", fmt::format("{}: its run was interrupted in the first pass, and it has {}; pixels "
                                                "without a sample are black",
@@ -264,8 +264,8 @@ bool noteDifferentScenes(const std::string& a, const std::string& b) {
 
 /// The attribute as text; empty without it.
 std::string textOf(const lobe::ImageAttributes& attributes, const char* key) {
-  const auto* text = valueOf<std::string>(attributes, key);
-  return text ? *text : std::string();
+  const auto* text = valueOf<lobe::AttributeText>(attributes, key);
+  return text ? std::string(*text) : std::string();
 }
 
 /// What makes the variances of two pictures differ, as far as their attributes say. Pictures of other programs and PNG

@@ -2,6 +2,7 @@
 // throws, or the scene is the same as without faults. In particular, no image, mesh or material is missing or replaced.
 
 #include <filesystem>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -77,6 +78,23 @@ int injectInto(Countdown& countdown, bool lenient) {
 }
 
 }  // namespace
+
+TEST_CASE("faults: failing allocations while attributes of images are copied") {
+  const std::string text(100, 'x');  // longer than what strings store without an allocation
+  const ImageAttributes attributes{{"a", text}, {"b", 1.0}, {"c", text}};
+  int failed = 0;
+  bool complete = false;
+  for (long n = 1; !complete; ++n) {
+    const Injection injection(allocations, n);
+    try {
+      const ImageAttributes copy = attributes;  // NOLINT(performance-unnecessary-copy-initialization)
+      complete = true;
+    } catch (const std::bad_alloc&) {
+      ++failed;
+    }
+  }
+  CHECK(failed == 5);  // the nodes of the map, and the texts
+}
 
 TEST_CASE("faults: failing reads of a scene, its images and its meshes") {
   CHECK(injectInto(reads, false) > 10);

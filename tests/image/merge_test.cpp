@@ -55,7 +55,7 @@ TEST_CASE("render: merged images list their sample ranges and can be merged agai
   p.paths.push_back(p.folder / "merged.exr");
   const MergedImage merged = mergeImages(std::span(p.paths).first(3));
   CHECK(std::get<double>(merged.attributes.at("samples")) == 12);
-  CHECK(std::get<std::string>(merged.attributes.at("sampleRanges")) == "guided 1 0 4, path 1 0 4, path 1 8 12");
+  CHECK(std::get<AttributeText>(merged.attributes.at("sampleRanges")) == "guided 1 0 4, path 1 0 4, path 1 8 12");
   CHECK(merged.attributes.count("integrator") == 0);
   CHECK(merged.attributes.count("sampleOffset") == 0);
   writeImage(p.paths[3], merged.image, merged.attributes);
@@ -66,7 +66,7 @@ TEST_CASE("render: merged images list their sample ranges and can be merged agai
   again.paths.push_back(p.paths[3]);
   const MergedImage whole = mergeImages(again.paths);
   CHECK(std::get<double>(whole.attributes.at("samples")) == 16);
-  CHECK(std::get<std::string>(whole.attributes.at("sampleRanges")) == "guided 1 0 4, path 1 0 12");
+  CHECK(std::get<AttributeText>(whole.attributes.at("sampleRanges")) == "guided 1 0 4, path 1 0 12");
 
   Pictures twice;
   twice.add(1, madeOf("path", 1, 11, 1));

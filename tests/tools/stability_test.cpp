@@ -364,8 +364,8 @@ TEST_CASE("loberender: a render that is interrupted in its first pass says that 
   // Usually the first pass is interrupted; it may have ended, or not begun, on a machine that is busy or fast.
   if (!folder.has("a.exr")) return;
   const ImageAttributes attributes = attributesOf(folder, "a.exr");
-  const bool isFirst =
-      attributes.contains("interrupted") && std::get<std::string>(attributes.at("interrupted")).starts_with("0 to 1 ");
+  const bool isFirst = attributes.contains("interrupted") &&
+                       std::get<AttributeText>(attributes.at("interrupted")).starts_with("0 to 1 ");
   CAPTURE(folder.bytes("error"));
   CHECK(isFirst == (folder.bytes("error").find("; pixels without a sample are black") != std::string::npos));
 }
