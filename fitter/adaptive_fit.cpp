@@ -143,9 +143,9 @@ class DirectionFits {
 
   /// Reduces the number of components while the fit stays good enough.
   FittedRecord less(FittedRecord best) const {
-    for (auto size = sizes_.rbegin(); size != sizes_.rend(); ++size) {
-      if (*size >= best.record.count) continue;
-      FittedRecord fitted = with(*size);
+    for (std::size_t i = sizes_.size(); i-- > 0;) {
+      if (sizes_[i] >= best.record.count) continue;
+      FittedRecord fitted = with(sizes_[i]);
       if (!goodEnough(fitted)) break;
       best = std::move(fitted);
     }

@@ -33,14 +33,19 @@ struct FitPoints {
 /// Residual functor for Ceres' TinySolver. Keeps a reference to the points.
 class FitResiduals {
  public:
+  // Names that TinySolver asks for.
+  // NOLINTBEGIN(readability-identifier-naming)
   using Scalar = double;
   enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = Eigen::Dynamic };
+  // NOLINTEND(readability-identifier-naming)
 
   FitResiduals(FitObjective objective, const FitPoints& points, std::size_t components)
       : objective_(objective), points_(points), components_(static_cast<int>(components)) {}
 
+  // NOLINTBEGIN(readability-identifier-naming)
   int NumResiduals() const { return static_cast<int>(points_.size()) + (objective_ == FitObjective::product ? 1 : 0); }
   int NumParameters() const { return kComponentParameters * components_; }
+  // NOLINTEND(readability-identifier-naming)
 
   /// jacobian is column-major with one row per residual, and may be null. Always returns true.
   bool operator()(const double* parameters, double* residuals, double* jacobian) const;
