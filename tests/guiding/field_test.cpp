@@ -413,11 +413,11 @@ TEST_CASE("guiding: a field with the records of an earlier one keeps them and ad
   const std::vector<IlluminationRecord> before = cacheOf(earlier).records();
   // The same paths, and others on a part of the floor that has no records.
   SampleStorage storage;
-  for (int i = 0; i < 2000; ++i) {
-    addPath(storage, static_cast<std::uint64_t>(2 * i));
-    Rng rng(6, 0, static_cast<std::uint64_t>(i));
+  for (std::uint64_t i = 0; i < 2000; ++i) {
+    addPath(storage, 2 * i);
+    Rng rng(6, 0, i);
     const Float3 position{5 + rng.uniform(), rng.uniform(), 0};
-    storage.beginPath(static_cast<std::uint64_t>(2 * i + 1));
+    storage.beginPath(2 * i + 1);
     storage.addPhoton(position, {0, 0, 1}, {0, 0.6f, 0.8f}, 1, 3, 1);
     storage.requestRecord(position, {0, 0, 1});
   }

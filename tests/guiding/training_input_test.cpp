@@ -23,9 +23,10 @@ SampleStorage randomStorage(std::uint64_t seed) {
   SampleStorage storage;
   for (std::uint64_t path = 0; path < 5 * seed; ++path) {
     storage.beginPath(100 * seed + path);
-    for (float i = 0; i < 3 * rng.uniform() - 1; ++i)
+    for (int i = 0; static_cast<float>(i) < 3 * rng.uniform() - 1; ++i)
       storage.addPhoton({rng.uniform(), 0, 0}, {0, 0, 1}, {0, 0, 1}, rng.uniform(), 1, 1);
-    for (float i = 0; i < 3 * rng.uniform() - 1; ++i) storage.requestRecord({rng.uniform(), 0, 0}, {0, 0, 1});
+    for (int i = 0; static_cast<float>(i) < 3 * rng.uniform() - 1; ++i)
+      storage.requestRecord({rng.uniform(), 0, 0}, {0, 0, 1});
   }
   return storage;
 }

@@ -1,5 +1,6 @@
 // Error metrics and image files.
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -96,8 +97,8 @@ TEST_CASE("render: the standard error of the mean error is that between blocks")
   // Relative errors of 100, 200, 300 and 400 in the four blocks.
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x) {
-      const auto block = static_cast<float>(x / kErrorBlock + 1);
-      image.at(x, y) = grey(std::sqrt(block));
+      const int block = x / kErrorBlock + 1;
+      image.at(x, y) = grey(std::sqrt(static_cast<float>(block)));
     }
   const ErrorMetrics m = compareImages(reference, image);
   CHECK(m.relmse == Approx(250));
@@ -165,7 +166,8 @@ TEST_CASE("render: error colours increase monotonically with the error") {
   CHECK((errorColour(1e9f) - Rgb::Ones()).abs().maxCoeff() < 1e-6f);
   CHECK(errorColour(kNan).z() == 1);
   float previous = -1;
-  for (float e = kMapLow; e <= kMapHigh; e *= 1.5f) {
+  for (int i = 0; i <= 20; ++i) {
+    const float e = kMapLow * std::pow(kMapHigh / kMapLow, static_cast<float>(i) / 20);
     CHECK(errorColour(e).x() >= previous);
     previous = errorColour(e).x();
   }

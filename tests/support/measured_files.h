@@ -102,7 +102,8 @@ inline std::string merlFile(const Brdf& brdf) {
   const double scales[] = {1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0};
   std::vector<double> planes(3 * kBins);
   for (std::size_t bin = 0; bin < kBins; ++bin) {
-    const double root = (static_cast<double>(bin / kBinsPerHalf) + 0.5) / 90.0;
+    const std::size_t binOfHalf = bin / kBinsPerHalf;
+    const double root = (static_cast<double>(binOfHalf) + 0.5) / 90.0;
     const double half = 0.5 * kPiD * root * root;
     const Eigen::Vector3d d = fromAngles((static_cast<double>(bin / 180 % 90) + 0.5) * kPiD / 180.0,
                                          (static_cast<double>(bin % 180) + 0.5) * kPiD / 180.0);
