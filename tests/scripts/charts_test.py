@@ -166,6 +166,8 @@ def check_errors(folder):
         assert word in drawn[0], word
     assert "<!-- black -->" not in drawn[0]
     assert f"hall.json: hall is also in {out}" in run(folder, "draw-errors", out, folder / "hall.json", "-o", chart, code=1)
+    alone = save(folder / "alone.json", ("hall", "path", 0.2))
+    assert "there are no results besides those of path" in run(folder, "draw-errors", alone, "-o", chart, code=1)
     assert "no scene is left" in run(folder, "draw-errors", save(folder / "black.json", ("black", "path", 0)), "-o", chart, code=1)
     assert "is not a file of scripts/report --save" in run(folder, "draw-errors", chart, "-o", chart, code=1)
     assert "must end in .svg" in run(folder, "draw-errors", room, "-o", folder / "errors.png", code=2)
