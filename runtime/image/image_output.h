@@ -14,8 +14,8 @@
 
 namespace lobe {
 
-/// The text of an attribute. A type of its own, because the std::variant of libstdc++ 12 takes std::string for a type
-/// whose construction leaves it with a value: if copying such a variant fails, it destroys a string that is not there.
+/// The text of an attribute. It is a type of its own, because libstdc++ 12 assumes that a std::variant of std::string
+/// always holds a value: if copying such a variant throws, a string that was never constructed is destroyed.
 struct AttributeText : std::string {
   using std::string::string;
   AttributeText(std::string text) : std::string(std::move(text)) {}
