@@ -18,6 +18,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 SKIPPED = 77
 PEER = "another-renderer-whose-name-is-wider-than-a-phone"
 DRAWING = """<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"><title>Roughness α</title><desc>One sentence.</desc></svg>"""
+UNTITLED = """<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"></svg>"""
 
 try:
     from selenium import webdriver
@@ -59,7 +60,8 @@ def make_page(tools, folder):
     assert other.returncode == 1 and "by another loberender" in other.stderr, f"pictures of other tools are mixed: {other.stderr}"
     record.write_text(of_these_tools)
     (folder / "drawing.svg").write_text(DRAWING)
-    subprocess.run([ROOT / "scripts/report", out, "--tools", tools, "--chart", ROOT / "docs/charts/slices.svg", "--chart", folder / "drawing.svg"],
+    (folder / "untitled.svg").write_text(UNTITLED)
+    subprocess.run([ROOT / "scripts/report", out, "--tools", tools, "--chart", folder / "untitled.svg", "--chart", folder / "drawing.svg"],
                    check=True)
     return out / "report.html"
 
@@ -171,7 +173,7 @@ def check_accessible(driver):
 
 def check_charts(driver):
     headings = [heading.text for heading in driver.find_elements(By.CSS_SELECTOR, "#charts h3")]
-    assert headings == ["slices.svg", "Roughness α"], headings
+    assert headings == ["untitled.svg", "Roughness α"], headings
     assert [one.text for one in driver.find_elements(By.CSS_SELECTOR, "#charts p")] == ["One sentence."]
     for drawing in driver.find_elements(By.CSS_SELECTOR, "#charts img"):
         assert driver.execute_script("return arguments[0].naturalWidth", drawing) > 0, "a chart is not shown"
