@@ -20,8 +20,12 @@ def check_tools(parser, folder, names, option="--tools FOLDER"):
 
 
 def lock(out):
-    """Ends the script if another one works in the folder. The folder is locked as long as the returned file is open."""
-    file = open(out / ".lock", "w")
+    """Makes the folder, and ends the script if that fails or another one works in it. It is locked as long as the returned file is open."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        file = open(out / ".lock", "w")
+    except OSError as e:
+        sys.exit(f"{e.filename}: {e.strerror}; choose a folder that can be written")
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

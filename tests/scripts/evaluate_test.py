@@ -302,6 +302,8 @@ def check_usage(folder):
     wrong("kitchen/scene.xml: no such scene file", new, "--scenes", "kitchen", LOBE_DATA=str(folder))
     assert not new.exists()
     wrong("tools/lobefit is not a folder", folder / "tools/lobefit", *command(folder)[1:])
+    within = folder / "tools/lobefit/within"
+    assert run("evaluate", within, *command(folder)[1:], code=1) == f"{within}: Not a directory; choose a folder that can be written\n"
 
 
 def write_exr(path, width, height):
