@@ -182,7 +182,8 @@ class AdaptiveFitter {
   void leaveToBsdf(const std::function<void()>& advance) {
     const std::vector<int> entries = entriesOf(lobe_, grid_);
     for (std::size_t i = 0; i < entries.size(); ++i) {
-      if (i < kTooNarrowRecords) add(entries[i], withoutComponents(entries[i]), 0);
+      if (i < kTooNarrowRecords)
+        add(entries[i], withoutComponents(lobe_, grid_.direction(entries[i]), settings_.samples), 0);
       if (advance) advance();
     }
   }
@@ -227,15 +228,6 @@ class AdaptiveFitter {
     // Where the lobe is hard to fit, another record would not help.
     if (moment <= (1 + fits.target()) * secondMoment(fitted)) return std::nullopt;
     return Fit{std::move(fitted), fits.target()};
-  }
-
-  FittedRecord withoutComponents(int entry) const {
-    FittedRecord fitted{{}, {}};
-    for (const LobeDraw& d : drawLobe(lobe_, grid_.direction(entry), 0, settings_.samples)) {
-      fitted.record.integral += static_cast<float>(d.value / d.pdf / settings_.samples);
-      fitted.record.albedo += static_cast<float>(d.value * d.wi.z() / d.pdf / settings_.samples);
-    }
-    return fitted;
   }
 
   void add(int entry, FittedRecord fitted, double target) {

@@ -127,7 +127,7 @@ FittedRecord notAboveWeightedEm(const DirectionFitter& fitter, const FitSettings
   return found.largerVariance() <= reached.largerVariance() ? found : fitter.fit(settings, reached.mixture);
 }
 
-/// A record of a chain and the direction it was fitted for.
+/// A record of a chain, with Gaussians, and the direction it was fitted for.
 struct Neighbour {
   const FittedRecord& fitted;
   Vec3 wo;
@@ -152,6 +152,16 @@ FittedRecord fitOfChain(const Lobe& lobe, const Vec3& wo, GridKind kind, const s
       fitter, settings, neighbour ? fitFromNeighbour(fitter, wo, kind, *neighbour, settings) : fitter.fit(settings));
 }
 
+/// A lobe may be too narrow for some directions only, such as grazing ones, and is left to BSDF sampling there.
+FittedRecord fitIfNotTooNarrow(const Lobe& lobe, const Vec3& wo, GridKind kind,
+                               const std::optional<Neighbour>& neighbour, const FitSettings& settings) {
+  try {
+    return fitOfChain(lobe, wo, kind, neighbour, settings);
+  } catch (const TooNarrow&) {
+    return withoutComponents(lobe, wo, settings.samples);
+  }
+}
+
 void fitChain(const Lobe& lobe, const DirectionGrid& grid, const std::vector<int>& chain, const FitSettings& settings,
               std::vector<FittedRecord>& fitted, const std::function<void()>& advance) {
   std::optional<Neighbour> neighbour;
@@ -159,8 +169,9 @@ void fitChain(const Lobe& lobe, const DirectionGrid& grid, const std::vector<int
     throwIfCancelled();
     const Vec3 wo = grid.direction(entry);
     FittedRecord& record = fitted[static_cast<std::size_t>(entry)];
-    record = fitOfChain(lobe, wo, grid.kind, neighbour, settings);
-    neighbour.emplace(Neighbour{record, wo});
+    record = fitIfNotTooNarrow(lobe, wo, grid.kind, neighbour, settings);
+    neighbour.reset();
+    if (!record.mixture.empty()) neighbour.emplace(Neighbour{record, wo});
     if (advance) advance();
   }
 }

@@ -59,7 +59,8 @@ FittedGrid fitForFile(const CompileJob& job, const std::function<void()>& advanc
 void writeCompiled(const CompileJob& job, const FittedGrid& fit);
 
 /// Fits a lobe over a grid, as runCompile does. A lobe that reflects nothing from any direction gets one record without
-/// Gaussians. Throws std::runtime_error like fitLobe.
+/// Gaussians, and so do directions for which a lobe is too narrow. Throws std::runtime_error if the lobe returns
+/// numbers that are not finite.
 FittedGrid fitGrid(const Lobe& lobe, const DirectionGrid& grid, const FitSettings& settings,
                    const std::function<void()>& advance = {});
 

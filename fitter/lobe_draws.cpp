@@ -9,9 +9,13 @@
 
 namespace lobe {
 
+std::string faultOfLobe(const Lobe& lobe, const Vec3& wo, const std::string& fault) {
+  return fmt::format("lobe {} cannot be fitted for the direction ({}, {}, {}): {}", lobe.summary(), wo.x(), wo.y(),
+                     wo.z(), fault);
+}
+
 void refuseLobe(const Lobe& lobe, const Vec3& wo, const std::string& fault) {
-  throw std::runtime_error(fmt::format("lobe {} cannot be fitted for the direction ({}, {}, {}): {}", lobe.summary(),
-                                       wo.x(), wo.y(), wo.z(), fault));
+  throw std::runtime_error(faultOfLobe(lobe, wo, fault));
 }
 
 double lobeValue(const Lobe& lobe, const Vec3& wo, const Vec3& wi) {

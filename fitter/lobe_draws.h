@@ -9,7 +9,10 @@
 
 namespace lobe {
 
-/// Throws a std::runtime_error that names the lobe, the direction and the fault.
+/// The message of an error: it names the lobe, the direction and the fault.
+std::string faultOfLobe(const Lobe& lobe, const Vec3& wo, const std::string& fault);
+
+/// Throws a std::runtime_error with this message.
 [[noreturn]] void refuseLobe(const Lobe& lobe, const Vec3& wo, const std::string& fault);
 
 /// ρ without the cosine. Throws std::runtime_error if the value is negative or not finite.

@@ -88,7 +88,7 @@ Mixture DirectionFitter::expectationMaximised(const FitSettings& settings) const
   Spread spread = spreadOf(points);
   if (points.size() < 3) spread = {kBroadVariance, 0, kBroadVariance};
   if (!(spread.smallerVariance() > kSharpest * kSharpest))
-    refuseLobe(lobe_, wo_, "it is too narrow to be fitted; treat it as a delta lobe");
+    throw TooNarrow(faultOfLobe(lobe_, wo_, "it is too narrow for Gaussians"));
   Mixture mixture = startMixture(points, spread, settings.components);
   WeightedEmOptions options;
   options.minVariance = kVarianceFloor * spread.smallerVariance();
@@ -146,6 +146,15 @@ FittedRecord DirectionFitter::fit(const FitSettings& settings, std::span<const G
   Mixture mixture = chained ? Mixture(start.begin(), start.end()) : expectationMaximised(settings);
   normalise(mixture);
   return record(wem ? graded(std::move(mixture)) : refined(mixture, settings));
+}
+
+FittedRecord withoutComponents(const Lobe& lobe, const Vec3& wo, std::uint32_t samples) {
+  FittedRecord fitted{{}, {}};
+  for (const LobeDraw& d : drawLobe(lobe, wo, 0, samples)) {
+    fitted.record.integral += static_cast<float>(d.value / d.pdf / samples);
+    fitted.record.albedo += static_cast<float>(d.value * d.wi.z() / d.pdf / samples);
+  }
+  return fitted;
 }
 
 FittedRecord fitLobe(const Lobe& lobe, const Vec3& wo, const FitSettings& settings, std::span<const Gaussian> start) {

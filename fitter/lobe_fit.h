@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <span>
+#include <stdexcept>
 #include <vector>
 
 #include "fitter/grade.h"
@@ -24,6 +25,12 @@ struct FittedRecord {
   CacheRecord record;  ///< first is 0, count is mixture.size()
   /// See Quality::largerVariance.
   float largerVariance() const { return std::max(record.nev, record.nevCoverage); }
+};
+
+/// The error of a lobe that is too narrow for Gaussians in single precision.
+class TooNarrow : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
 };
 
 /// Fits mixtures for one direction, reusing the samples of the lobe. Keeps a reference to the lobe.
@@ -51,9 +58,13 @@ class DirectionFitter {
 /// Fits the lobe for wo (unit, z > 0). Deterministic. Where nothing is reflected, the record has integral and albedo 0
 /// and one broad component. Least squares starts from weighted EM, or from `start` if it is not empty (the mixture of a
 /// neighbouring direction, aligned with wo), whose components keep their order and number. The result of least squares
-/// is kept only if its grade (Quality::largerVariance) is better than that of the start. Throws std::runtime_error if
-/// the lobe returns numbers that are not finite or is too narrow.
+/// is kept only if its grade (Quality::largerVariance) is better than that of the start. Throws TooNarrow, or another
+/// std::runtime_error if the lobe returns numbers that are not finite.
 FittedRecord fitLobe(const Lobe& lobe, const Vec3& wo, const FitSettings& settings,
                      std::span<const Gaussian> start = {});
+
+/// A record without Gaussians for a lobe that is left to BSDF sampling: with integral and albedo only. Throws
+/// std::runtime_error if the lobe returns numbers that are not finite.
+FittedRecord withoutComponents(const Lobe& lobe, const Vec3& wo, std::uint32_t samples);
 
 }  // namespace lobe

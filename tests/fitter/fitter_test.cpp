@@ -203,7 +203,19 @@ TEST_CASE("fitter: lobes without reflectance get one record without components")
 TEST_CASE("fitter: errors say why a lobe cannot be fitted") {
   const DirectionGrid grid{GridKind::elevation, 4};
   CHECK_THROWS_WITH(fitGrid(TestLobe(std::nan("")), grid, {}), Catch::Contains("its value is nan"));
-  CHECK_THROWS_WITH(fitGrid(TestLobe(1, true, 5e-6f), grid, {}), Catch::Contains("too narrow"));
+  CHECK_THROWS_WITH(fitLobe(TestLobe(1, true, 5e-6f), direction(20), {}), Catch::Contains("too narrow"));
+}
+
+TEST_CASE("fitter: directions of a fixed grid for which a lobe is too narrow get records without components") {
+  const DirectionGrid grid{GridKind::elevation, 4};
+  for (const FitMethod method : {FitMethod::wem, FitMethod::ceres, FitMethod::eq8, FitMethod::automatic}) {
+    FitSettings settings;
+    settings.method = method;
+    const FittedGrid fit = fitGrid(TestLobe(1, true, 5e-6f), grid, settings);
+    REQUIRE(fit.records.size() == 4);
+    CHECK(fit.components.empty());
+    for (const CacheRecord& r : fit.records) CHECK((r.count == 0 && r.cosineMass == 0 && r.albedo > 0));
+  }
 }
 
 TEST_CASE("fitter: look-up rotates and translates mixtures towards the query in the right direction") {
