@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "runtime/mixture/lookup.h"
 #include "runtime/tools/cache_grid.h"
 #include "runtime/tools/cache_report.h"
 #include "runtime/tools/tool.h"
@@ -121,7 +122,9 @@ CacheDifference compareCaches(const LobeCache& a, const LobeCache& b) {
   for (std::size_t i = 0; i < fieldsA.size(); ++i)
     if (fieldsA[i] != fieldsB[i]) d.fields.push_back({fieldsA[i].first, fieldsA[i].second, fieldsB[i].second});
   for (std::size_t i = 0; i < a.records().size(); ++i) {
-    const auto entry = static_cast<std::uint32_t>(gridB.nearest(directionOf(a, i)));
+    const Vec3 wo = directionOf(a, i);
+    const Mirror mirror = b.info().quarter ? Mirror::intoQuadrant(wo) : Mirror{};
+    const auto entry = static_cast<std::uint32_t>(gridB.nearest(mirror(wo)));
     RecordPair pair{static_cast<int>(i), static_cast<int>(b.lookup(entry)), false};
     pair.same = sameRecord(a, b, pair);
     countQuality(d, recordOf(a, pair.a), recordOf(b, pair.b));

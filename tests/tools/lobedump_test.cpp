@@ -92,6 +92,20 @@ void writePartlyFitted(const fs::path& path, const std::vector<bool>& fitted) {
   writeAtomically(path, encodeLobeCache(info, records, components, lookup));
 }
 
+/// Writes and opens a cache of a Fibonacci grid with these look-ups and as many records, which are left to BSDF
+/// sampling.
+LobeCache withLookups(const fs::path& path, const std::vector<std::uint32_t>& lookup, bool quarter) {
+  LobeCacheInfo info;
+  info.model = info.key = info.summary = info.toolVersion = "looked up";
+  info.gridKind = static_cast<std::uint8_t>(GridKind::fibonacci);
+  info.gridCount = static_cast<std::uint32_t>(lookup.size());
+  info.quarter = quarter;
+  std::vector<CacheRecord> records(lookup.size());
+  for (std::uint32_t i = 0; i < info.gridCount; ++i) records[i].entry = i;
+  writeAtomically(path, encodeLobeCache(info, records, {}, lookup));
+  return LobeCache::open(path);
+}
+
 /// The records in the table that lobedump --plot prints: a line about the plot, a header, one line for each row.
 std::vector<int> plottedRecords(const std::string& table) {
   std::istringstream lines(table);
@@ -418,6 +432,28 @@ TEST_CASE("fitter: lobedump --diff --json counts and matches records") {
   const auto more = diff("good.lobe more.lobe");
   CHECK((more["same_grid"] == false && more["records"].size() == 8));
   CHECK(more["records"][7]["b"]["record"] >= 14);
+}
+
+TEST_CASE("fitter: records are compared with those that the renderer looks up in a cache of one quadrant") {
+  const Folder folder;
+  const DirectionGrid grid{GridKind::fibonacci, 64};
+  std::vector<std::uint32_t> all(64), inQuadrant(64);
+  for (int i = 0; i < grid.count; ++i) {
+    const Vec3 w = grid.direction(i);
+    all[static_cast<std::size_t>(i)] = static_cast<std::uint32_t>(i);
+    inQuadrant[static_cast<std::size_t>(i)] = w.x() >= 0 && w.y() >= 0 ? 0 : 1;
+  }
+  const LobeCache a = withLookups(folder / "a.lobe", all, false), b = withLookups(folder / "b.lobe", inQuadrant, true);
+  const CacheDifference difference = compareCaches(a, b);
+  int mirrored = 0;
+  for (const RecordPair& pair : difference.records) {
+    const Vec3 w = grid.direction(pair.a);
+    // Entries near the sides of the quadrant may be outside.
+    if (std::min(std::abs(w.x()), std::abs(w.y())) < 0.3f) continue;
+    CHECK(pair.b == 0);
+    mirrored += w.x() < 0 || w.y() < 0 ? 1 : 0;
+  }
+  CHECK(mirrored > 10);
 }
 
 TEST_CASE("fitter: lobedump shows all quantities of a record") {
