@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
+#include <span>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -48,7 +48,7 @@ const CacheRecord& recordOf(const LobeCache& cache, int index) {
 
 template <class T>
 bool sameBytes(std::span<const T> a, std::span<const T> b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
+  return std::ranges::equal(std::as_bytes(a), std::as_bytes(b));
 }
 
 bool sameRecord(const LobeCache& a, const LobeCache& b, const RecordPair& pair) {

@@ -456,6 +456,18 @@ TEST_CASE("fitter: records are compared with those that the renderer looks up in
   CHECK(mirrored > 10);
 }
 
+TEST_CASE("fitter: caches without components can be compared") {
+  const Folder folder;
+  writePartlyFitted(folder / "a.lobe", {false, false});
+  writePartlyFitted(folder / "b.lobe", {false, false, false});
+  const LobeCache a = LobeCache::open(folder / "a.lobe"), b = LobeCache::open(folder / "b.lobe");
+  const CacheDifference same = compareCaches(a, a), other = compareCaches(a, b);
+  CHECK((same.equal && !other.equal && !other.sameGrid));
+  CHECK((same.records.size() == 2 && same.records[0].same && same.records[1].same));
+  CHECK((other.records.size() == 2 && other.records[0].same && !other.records[1].same));
+  CHECK((other.better == 0 && other.worse == 0 && other.alike == 0));
+}
+
 TEST_CASE("fitter: lobedump shows all quantities of a record") {
   const Caches folder;
   const auto json = parseJson(folder.run("lobedump --json good.lobe").out)[0];
