@@ -21,7 +21,7 @@ namespace lobe {
 namespace {
 
 constexpr int kMaxRecords = 1 << 20;
-constexpr std::uint32_t kMinSamples = 16, kMaxSamples = 1 << 24;
+constexpr std::uint32_t kMinSamples = 16;
 
 void require(bool condition, const char* option, const std::string& range) {
   if (!condition) throw std::runtime_error(fmt::format("{} must be {}", option, range));
@@ -211,8 +211,8 @@ void CompileOptions::validate() const {
   require(!directory.empty(), "--output", "the name of a folder");
   require(settings.components >= 1 && settings.components <= kMaxCacheComponents, "--components",
           fmt::format("from 1 to {}", kMaxCacheComponents));
-  require(settings.samples >= kMinSamples && settings.samples <= kMaxSamples, "--samples",
-          fmt::format("from {} to {}", kMinSamples, kMaxSamples));
+  require(settings.samples >= kMinSamples && settings.samples <= kMaxFitSamples, "--samples",
+          fmt::format("from {} to {}", kMinSamples, kMaxFitSamples));
   require(settings.reduction >= 0 && std::isfinite(settings.reduction), "--reduction", "0 or more");
   require(settings.quality > 0 && std::isfinite(settings.quality), "--quality", "greater than 0");
   for (const auto& [count, option] : {std::pair{elevations, "--elevations"}, std::pair{directions, "--directions"}})

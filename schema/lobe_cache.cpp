@@ -33,17 +33,23 @@ void checkRecord(const CacheRecord& r, std::size_t index, std::span<const CacheC
   require(r.count == 0 || weightsSumToOne(components.subspan(r.first, r.count)), "the weights do not sum to one");
 }
 
-LobeCacheInfo readInfo(const fb::LobeCache& cache, const std::string& file) {
-  const fb::FitSettings& s = *cache.settings();
+FitSettings readSettings(const fb::FitSettings& s, const std::string& file) {
   const std::optional<FitMethod> method = fitMethodOf(s.method() ? s.method()->string_view() : "");
   if (!method) refuseDamaged(file, "its records were fitted by an unknown method");
+  if (s.samples() > kMaxFitSamples) refuseDamaged(file, fmt::format("fitted to {} samples: out of range", s.samples()));
+  if (!allFinite({s.reduction(), s.quality()}) || s.reduction() < 0 || s.quality() < 0)
+    refuseDamaged(file, "reduction or quality of the fit out of range");
+  return {*method, s.components(), s.samples(), s.reduction(), s.revision(), s.quality(), s.fixed_grid()};
+}
+
+LobeCacheInfo readInfo(const fb::LobeCache& cache, const std::string& file) {
   LobeCacheInfo info;
   info.toolVersion = cache.tool_version()->str();
   info.model = cache.model()->str();
   info.key = cache.key()->str();
   info.summary = cache.summary()->str();
   info.modelRevision = cache.model_revision();
-  info.settings = {*method, s.components(), s.samples(), s.reduction(), s.revision(), s.quality(), s.fixed_grid()};
+  info.settings = readSettings(*cache.settings(), file);
   info.gridKind = cache.grid_kind();
   info.gridCount = cache.grid_count();
   info.quarter = cache.quarter();

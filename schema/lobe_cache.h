@@ -33,6 +33,9 @@ inline const char* nameOf(FitMethod method) {
 }
 std::optional<FitMethod> fitMethodOf(std::string_view name);
 
+/// Largest number of components of a record in a cache, and of samples that a record is fitted to.
+inline constexpr std::uint32_t kMaxCacheComponents = 32, kMaxFitSamples = 1 << 24;
+
 struct FitSettings {
   FitMethod method = FitMethod::wem;
   std::uint32_t components = 8;
@@ -58,8 +61,8 @@ struct LobeCacheInfo {
 class LobeCache {
  public:
   /// Reads the file and checks its structure and content: one look-up per grid entry, indices in range, weights that
-  /// sum to one, positive definite covariances, finite numbers. Throws std::runtime_error that names the file and the
-  /// fault.
+  /// sum to one, positive definite covariances, finite numbers, settings of the fit in range. Throws std::runtime_error
+  /// that names the file and the fault.
   static LobeCache open(const std::filesystem::path& path);
 
   const LobeCacheInfo& info() const { return info_; }
@@ -84,9 +87,6 @@ class LobeCache {
   std::span<const std::uint32_t> lookup_;
   ContainerHeader header_{};
 };
-
-/// Largest number of components of a record in a cache.
-inline constexpr std::uint32_t kMaxCacheComponents = 32;
 
 /// The file name of a lobe, "MODEL-HASH.lobe". It does not depend on the settings of the fit, so that renderer and
 /// fitter always use the same name.

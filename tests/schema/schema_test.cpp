@@ -205,7 +205,7 @@ TEST_CASE("schema: a newer minor version is read and another major version rejec
 
 TEST_CASE("schema: invalid values in caches are rejected") {
   const Opener opener;
-  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
   struct Fault {
     const char* words;
     std::function<void(Content&)> make;
@@ -235,12 +235,22 @@ TEST_CASE("schema: invalid values in caches are rejected") {
       {"look-ups for a grid", [](Content& c) { c.info.gridCount = 3; }},
       {"unknown kind", [](Content& c) { c.info.gridKind = 2; }},
       {"look-ups for a grid", [](Content& c) { c.info.gridCount = 0, c.records.clear(); }},
+      {"damaged: fitted to 4294967295 samples", [](Content& c) { c.info.settings.samples = 0xffffffffu; }},
+      {"samples: out of range", [](Content& c) { c.info.settings.samples = kMaxFitSamples + 1; }},
+      {"reduction or quality", [&](Content& c) { c.info.settings.reduction = nan; }},
+      {"reduction or quality", [](Content& c) { c.info.settings.reduction = -0.1f; }},
+      {"reduction or quality", [&](Content& c) { c.info.settings.quality = infinity; }},
+      {"reduction or quality", [](Content& c) { c.info.settings.quality = -1; }},
   };
   for (const Fault& fault : faults) {
     Content content = smallCache();
     fault.make(content);
     CHECK_THAT(opener.fault(content), Catch::Contains(fault.words));
   }
+  Content most = smallCache();
+  most.info.settings.samples = kMaxFitSamples;
+  most.info.settings.reduction = most.info.settings.quality = std::numeric_limits<float>::max();
+  CHECK(opener.fault(most).empty());
 }
 
 TEST_CASE("schema: files are written completely or not at all") {
