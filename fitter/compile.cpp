@@ -72,15 +72,33 @@ std::string difference(const LobeCacheInfo& have, const LobeCacheInfo& want, con
   return {};
 }
 
-void check(CompileJob& job, bool force) {
-  std::error_code error;  // of names that the system refuses, which writing reports
-  if (!std::filesystem::exists(job.path, error)) return;
+void checkContent(CompileJob& job, FileContent content) {
   try {
-    job.stale = force ? "--force" : difference(LobeCache::open(job.path).info(), job.info, *job.use.lobe);
+    const LobeCache cache(std::move(content), job.path);
+    job.stale = difference(cache.info(), job.info, *job.use.lobe);
     job.upToDate = job.stale.empty();
+  } catch (const NewerFormat& e) {
+    job.fault = e.what();
   } catch (const std::runtime_error& e) {
     job.stale = e.what();
   }
+}
+
+void check(CompileJob& job, bool force) {
+  std::error_code error;  // of names that the system refuses, which writing reports, as it does for folders
+  if (!std::filesystem::is_regular_file(job.path, error)) return;
+  if (force) {
+    job.stale = "--force";
+    return;
+  }
+  std::optional<FileContent> content;
+  try {
+    content.emplace(job.path);
+  } catch (const std::runtime_error& e) {
+    job.fault = e.what();
+    return;
+  }
+  checkContent(job, std::move(*content));
 }
 
 void makeFolder(const std::filesystem::path& folder) {
@@ -223,7 +241,7 @@ std::vector<CompileJob> planCompile(const std::vector<LobeUse>& uses, const Comp
   std::vector<CompileJob> jobs;
   for (const LobeUse& use : uses) {
     const DirectionGrid grid = gridFor(*use.lobe, options);
-    CompileJob job{use, grid, infoFor(*use.lobe, grid, settingsFor(*use.lobe, options)), {}, false, {}};
+    CompileJob job{use, grid, infoFor(*use.lobe, grid, settingsFor(*use.lobe, options)), {}, false, {}, {}};
     job.path = options.directory / lobeFileName(use.lobe->model(), use.lobe->key());
     check(job, options.force);
     jobs.push_back(std::move(job));
@@ -244,6 +262,7 @@ int workOf(const CompileJob& job) {
 }
 
 FittedGrid fitForFile(const CompileJob& job, const std::function<void()>& advance) {
+  if (!job.fault.empty()) throw std::runtime_error(job.fault);
   makeFolder(job.path.parent_path());
   checkWritable(job.path);
   return fitGrid(*job.use.lobe, job.grid, job.info.settings, advance);

@@ -40,10 +40,13 @@ struct CompileJob {
   std::filesystem::path path;
   bool upToDate = false;
   std::string stale;  ///< why an existing file cannot be used; empty otherwise
+  std::string fault;  ///< why the file must not be replaced, although it cannot be used; empty otherwise
 };
 
 /// Checks which cache files exist and are up to date: a file is up to date if it can be opened and its key, model
-/// revision, fit settings and grid are the requested ones.
+/// revision, fit settings and grid are the requested ones. Damaged files and those of an older format are stale. Unless
+/// options.force is set, a file of a newer format and one that the system does not let us read are faults instead,
+/// because they may be up to date for others.
 std::vector<CompileJob> planCompile(const std::vector<LobeUse>& uses, const CompileOptions& options);
 
 /// The number of times that runCompile calls advance.
@@ -51,10 +54,10 @@ int workOf(const CompileJob& job);
 
 /// Fits all records of the job on all cores and writes the file, creating its folder if necessary. advance is called
 /// once per visited direction, from any thread. The content of the file does not depend on the number of threads.
-/// Throws std::runtime_error.
+/// Throws std::runtime_error, also if the job has a fault.
 void runCompile(const CompileJob& job, const std::function<void()>& advance);
 
-/// The two halves of runCompile: fits the records, after it has made sure that the file can be written, and writes it.
+/// The two halves of runCompile: fits the records, after it has made sure that the file may be written, and writes it.
 FittedGrid fitForFile(const CompileJob& job, const std::function<void()>& advance);
 void writeCompiled(const CompileJob& job, const FittedGrid& fit);
 

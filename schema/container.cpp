@@ -48,9 +48,11 @@ std::string printable(const char (&kind)[4]) {
 void checkVersion(const FileFormat& format, const Header& header, const std::string& name) {
   if (header.major == format.major) return;
   const bool newer = header.major > format.major;
-  refuse(name, fmt::format("format version {}.{} is {} than this program's {}.{}: {}", header.major, header.minor,
-                           newer ? "newer" : "older", format.major, format.minor,
-                           newer ? "use a newer Lobe" : "make the file again"));
+  const std::string fault = fmt::format("{}: format version {}.{} is {} than this program's {}.{}: {}", name,
+                                        header.major, header.minor, newer ? "newer" : "older", format.major,
+                                        format.minor, newer ? "use a newer Lobe" : "make the file again");
+  if (newer) throw NewerFormat(fault);
+  throw std::runtime_error(fault);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -46,12 +47,18 @@ class FileContent {
   std::string bytes_;  // in place only if it is shorter than a header
 };
 
+/// The error of a file whose format is newer than this program's: another version of the program can read it.
+class NewerFormat : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 /// The bytes of a file: header and payload.
 std::vector<std::byte> wrapPayload(const FileFormat& format, std::span<const std::byte> payload);
 
 /// Checks magic, kind, version, size and hash, in this order, and returns the payload, which is 8-byte aligned if
-/// `bytes` is. Any minor version is accepted; another major version is refused. Throws std::runtime_error with the
-/// message "NAME: what is wrong", and what to do about another version.
+/// `bytes` is. Any minor version is accepted; another major version is refused. Throws std::runtime_error, of which
+/// NewerFormat is one, with the message "NAME: what is wrong", and what to do about another version.
 std::span<const std::byte> unwrapPayload(const FileFormat& format, std::span<const std::byte> bytes,
                                          const std::string& name);
 

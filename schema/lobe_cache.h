@@ -64,6 +64,8 @@ class LobeCache {
   /// sum to one, positive definite covariances, finite numbers, settings of the fit in range. Throws std::runtime_error
   /// that names the file and the fault.
   static LobeCache open(const std::filesystem::path& path);
+  /// The same for the content of a file that has been read already.
+  LobeCache(FileContent file, const std::filesystem::path& path);
 
   const LobeCacheInfo& info() const { return info_; }
   std::span<const CacheRecord> records() const { return records_; }
@@ -79,7 +81,6 @@ class LobeCache {
   std::size_t bytes() const { return file_.bytes().size(); }
 
  private:
-  LobeCache(FileContent file, const std::filesystem::path& path);
   FileContent file_;
   LobeCacheInfo info_;
   std::span<const CacheRecord> records_;

@@ -63,7 +63,8 @@ void declare(CLI::App& app, Options& o) {
   app.add_option("--reduction", o.reduction,
                  "Merge Gaussians of a record up to this cost (Runnalls 2007; 0: no merging; not with --method auto)")
       ->default_str(fmt::format("{:g}", o.compile.settings.reduction));
-  app.add_flag("--force", o.compile.force, "Fit all lobes again, even if their caches are up to date");
+  app.add_flag("--force", o.compile.force,
+               "Fit all lobes again, even if their caches are up to date or have a newer format");
   app.add_flag("--lenient", o.read.lenient, "Replace or leave out faulty parts of the scene, with warnings");
   app.add_flag("--check", o.check,
                "Only read the materials and print all faults, warnings and notes; exit with 1 if they cannot be read");
@@ -128,7 +129,7 @@ void checkCaches(const std::vector<CompileJob>& jobs, const Scene& scene, const 
 double workOfAll(const std::vector<CompileJob>& jobs) {
   double directions = 0;
   for (const CompileJob& job : jobs)
-    if (!job.upToDate) directions += workOf(job);
+    if (!job.upToDate && job.fault.empty()) directions += workOf(job);
   return directions;
 }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include <sys/resource.h>
+
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 #include <tbb/task.h>
@@ -84,6 +86,72 @@ TEST_CASE("fitter: caches that are up to date are kept and stale ones give a rea
   CHECK(jobs[1].upToDate);
   fs::resize_file(jobs[1].path, 100);
   CHECK_THAT(planCompile(uses, options)[1].stale, Catch::Contains("truncated"));
+}
+
+TEST_CASE("fitter: caches of a newer format and those that cannot be read are kept") {
+  const Folder folder;
+  const std::vector<LobeUse> uses = collectLobes(sceneOf({{"iso", roughConductor(0.3, 0.3)}}));
+  CompileOptions options = quickOptions(folder.path());
+  const fs::path path = planCompile(uses, options)[0].path;
+  runAll(planCompile(uses, options));
+  const std::string sound = readFile(path);
+  const auto checkKept = [&](const CompileJob& job, const std::string& fault) {
+    CHECK((!job.upToDate && job.stale.empty()));
+    CHECK_THAT(job.fault, Catch::StartsWith(path.string() + ": ") && Catch::Contains(fault));
+    const std::string before = readFile(path);
+    CHECK_THROWS_WITH(runCompile(job, [] {}), job.fault);
+    CHECK(readFile(path) == before);
+  };
+
+  rlimit files{};
+  getrlimit(RLIMIT_NOFILE, &files);
+  const rlimit none{0, files.rlim_max};
+  setrlimit(RLIMIT_NOFILE, &none);
+  const CompileJob unreadable = planCompile(uses, options)[0];
+  setrlimit(RLIMIT_NOFILE, &files);
+  checkKept(unreadable, "cannot open");
+
+  std::string newer = sound, older = sound;
+  newer[8] = static_cast<char>(kLobeFormat.major + 1);
+  older[8] = static_cast<char>(kLobeFormat.major - 1);
+  writeAtomically(path, newer);
+  checkKept(planCompile(uses, options)[0], "use a newer Lobe");
+  options.force = true;
+  const CompileJob forced = planCompile(uses, options)[0];
+  CHECK((forced.stale == "--force" && forced.fault.empty()));
+  runCompile(forced, [] {});
+  CHECK(readFile(path) == sound);
+
+  options.force = false;
+  writeAtomically(path, older);
+  const CompileJob again = planCompile(uses, options)[0];
+  CHECK_THAT(again.stale, Catch::Contains("older"));
+  runCompile(again, [] {});
+  CHECK(readFile(path) == sound);
+}
+
+TEST_CASE("fitter: lobefit names a cache of a newer format and writes the others") {
+  const Folder folder;
+  writeAtomically(folder / "scene.xml", std::string(R"(<scene version="0.6.0">
+    <shape type="sphere"><bsdf type="roughconductor"><float name="alpha" value="0.2"/></bsdf></shape>
+    <shape type="sphere"><bsdf type="roughconductor"><float name="alpha" value="0.3"/></bsdf></shape></scene>)"));
+  const std::string fit = "lobefit scene.xml --elevations 4 --samples 256";
+  REQUIRE(runBinary(folder.path(), fit).code == 0);
+  std::vector<fs::path> caches;
+  for (const auto& entry : fs::directory_iterator(folder / "lobes")) caches.push_back(entry.path());
+  REQUIRE(caches.size() == 2);
+  std::string newer = readFile(caches[0]);
+  const std::string other = readFile(caches[1]);
+  newer[8] = static_cast<char>(kLobeFormat.major + 1);
+  writeAtomically(caches[0], newer);
+  fs::remove(caches[1]);
+  const ToolRun r = runBinary(folder.path(), fit);
+  CHECK(r.code == 1);
+  CHECK_THAT(r.error, Catch::Contains("lobefit: error: lobes/" + caches[0].filename().string() + ": format version") &&
+                          Catch::Contains("1 of 2 lobes written") && !Catch::Contains("fitted again"));
+  CHECK((readFile(caches[0]) == newer && readFile(caches[1]) == other));
+  CHECK(runBinary(folder.path(), fit + " --force").code == 0);
+  CHECK(readFile(caches[0]) != newer);
 }
 
 TEST_CASE("fitter: near-mirrors get caches on fixed grids with each method") {

@@ -50,7 +50,7 @@ struct FittingOptions {
   /// of the lobe, and otherwise from the fitted mixture times cosθ (Herholz et al. 2016, Appendix C).
   float quality = 0.03f;
   int components = 8;  ///< largest number of Gaussians per record, 1 to 32
-  bool force = false;  ///< fit again even if the cache file is up to date
+  bool force = false;  ///< fit again even if the cache file is up to date, or of a newer format
 
   /// Throws std::runtime_error that names the first field that is out of range.
   void validate() const;
@@ -69,7 +69,8 @@ struct CompiledLobe {
 /// of threads. The records of a lobe that reflects nothing or is too narrow for Gaussians have no components; guiding
 /// then leaves the lobe to BSDF sampling. Throws std::runtime_error that names the lobe, field or file if a field or
 /// option is invalid, if a function returns a value out of range, if `sample` draws nothing although `evaluate` is
-/// positive, or if the file cannot be written; no file is written then. Exceptions of the functions are thrown again.
+/// positive, if the file cannot be written, or if there is a file that cannot be read or has a newer format, unless
+/// FittingOptions::force is set; no file is written then. Exceptions of the functions are thrown again.
 CompiledLobe compileLobe(const LobeFunctions& lobe, const FittingOptions& options = {});
 
 }  // namespace lobe
