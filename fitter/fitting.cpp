@@ -5,11 +5,13 @@
 #include <cmath>
 #include <span>
 #include <stdexcept>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "fitter/compile.h"
 #include "runtime/core/parallel.h"
+#include "runtime/mixture/grid.h"
 
 namespace lobe {
 namespace {
@@ -68,10 +70,21 @@ void validate(const LobeFunctions& lobe) {
     throw std::runtime_error("LobeFunctions: evaluate, sample and pdf must all be set");
 }
 
+/// Whether the lobe reflects light between any two directions of a small grid, or in the direction of a mirror.
+bool reflects(const LobeFunctions& lobe) {
+  const DirectionGrid grid{GridKind::fibonacci, 32};
+  std::vector<Float3> directions{Float3{0, 0, 1}};
+  for (int i = 0; i < grid.count; ++i) directions.push_back(floats(grid.direction(i)));
+  return std::ranges::any_of(directions, [&](const Float3& wo) {
+    const auto reflectsTo = [&](const Float3& wi) { return lobe.evaluate(wo, wi) > 0; };
+    return reflectsTo({-wo.x, -wo.y, wo.z}) || std::ranges::any_of(directions, reflectsTo);
+  });
+}
+
 /// Refuses a lobe without records of positive integral although it reflects light.
 void checkSampled(const LobeFunctions& lobe, std::span<const CacheRecord> records) {
   const bool black = std::ranges::none_of(records, [](const CacheRecord& r) { return r.integral > 0; });
-  if (black && lobe.evaluate({0, 0, 1}, {0, 0, 1}) > 0)
+  if (black && reflects(lobe))
     throw std::runtime_error(
         fmt::format("lobe {}: sample draws no direction although evaluate is positive", lobe.model));
 }

@@ -211,8 +211,16 @@ TEST_CASE("fitter: no file is written for a lobe whose sampler draws nothing") {
   lobe.pdf = [](const Float3&, const Float3&) { return 0.0f; };
   FittingOptions options;
   options.folder = folder / "caches";
-  CHECK_THROWS_WITH(compileLobe(lobe, options), Catch::Contains("draws no direction"));
-  CHECK(fs::is_empty(options.folder));
+  const auto grazing = [](const Float3& w) { return w.z < 0.5f ? 0.3 : 0.0; };
+  const std::function<double(const Float3&, const Float3&)> reflectances[] = {
+      lobe.evaluate,
+      [&](const Float3& wo, const Float3& wi) { return grazing(wo) * grazing(wi); },  // like sheen, black from above
+      [](const Float3& wo, const Float3& wi) { return wi.x == -wo.x && wi.y == -wo.y ? 1e9 : 0.0; }};  // a mirror
+  for (const auto& reflectance : reflectances) {
+    lobe.evaluate = reflectance;
+    CHECK_THROWS_WITH(compileLobe(lobe, options), Catch::Contains("draws no direction"));
+    CHECK(fs::is_empty(options.folder));
+  }
   lobe.evaluate = [](const Float3&, const Float3&) { return 0.0; };  // black
   CHECK(compileLobe(lobe, options).fitted);
   CHECK(!compileLobe(lobe, options).fitted);
