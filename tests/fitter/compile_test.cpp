@@ -186,19 +186,28 @@ TEST_CASE("fitter: near-mirrors get caches on fixed grids with each method") {
 
 TEST_CASE("fitter: cache files do not depend on the number of threads") {
   const Folder folder;
-  const std::vector<LobeUse> uses =
-      collectLobes(sceneOf({{"iso", roughConductor(0.3, 0.3)}, {"aniso", roughConductor(0.1, 0.3)}}));
-  std::array<std::vector<std::string>, 2> contents;
-  for (const std::size_t threads : {1u, 2u}) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    CompileOptions options = quickOptions(folder.path());
-    options.directory = folder / std::to_string(threads);
-    const std::vector<CompileJob> jobs = planCompile(uses, options);
-    runAll(jobs);
-    for (const CompileJob& job : jobs) contents[threads - 1].push_back(readFile(job.path));
+  const LobeUse iso = collectLobes(sceneOf({{"iso", roughConductor(0.3, 0.3)}})).at(0),
+                aniso = collectLobes(sceneOf({{"aniso", roughConductor(0.1, 0.3)}})).at(0);
+  CompileOptions fixedGrid = quickOptions(folder.path()), adaptive = fixedGrid;
+  adaptive.elevations = adaptive.directions = std::nullopt;
+  adaptive.settings.quality = 0.3f;
+  struct Case {
+    std::vector<LobeUse> uses;
+    CompileOptions options;
+  };
+  for (Case c : {Case{{iso, aniso}, fixedGrid}, Case{{aniso}, adaptive}}) {
+    std::array<std::vector<std::string>, 2> contents;
+    for (const std::size_t threads : {1u, 2u}) {
+      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+      c.options.directory = folder / std::to_string(threads);
+      c.options.force = true;
+      const std::vector<CompileJob> jobs = planCompile(c.uses, c.options);
+      runAll(jobs);
+      for (const CompileJob& job : jobs) contents[threads - 1].push_back(readFile(job.path));
+    }
+    CHECK(contents[0] == contents[1]);
+    CHECK(contents[0].at(0).size() > 500);
   }
-  CHECK(contents[0] == contents[1]);
-  CHECK(contents[0][0].size() > 500);
 }
 
 TEST_CASE("fitter: no file is written for a lobe whose sampler draws nothing") {
