@@ -1,5 +1,6 @@
 #include "schema/checkpoint_file.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -72,7 +73,8 @@ CheckpointFile::CheckpointFile(FileContent file, const std::filesystem::path& pa
   if (pixels_.empty() || std::uint64_t{info_.width} * info_.height != pixels_.size())
     refuseDamaged(name, fmt::format("{} pixels for a film of {}x{}", pixels_.size(), info_.width, info_.height));
   for (std::size_t i = 0; i < pixels_.size(); ++i) checkPixel(pixels_[i], i, name);
-  if (!isNumber(info_.trainingSeconds) || !isNumber(info_.renderingSeconds))
+  const bool passTimes = std::ranges::all_of(info_.passes, isNumber, &StoredPass::seconds);
+  if (!isNumber(info_.trainingSeconds) || !isNumber(info_.renderingSeconds) || !passTimes)
     refuseDamaged(name, "a time is negative or not finite");
   checkChoices(info_, name);
   if (!(info_.undersampledFraction >= 0 && info_.undersampledFraction <= 1))

@@ -105,6 +105,8 @@ TEST_CASE("schema: invalid content of a checkpoint is refused") {
   CHECK_THAT(fault([&](Content& c) { c.pixels[0].squares[0] = infinity; }), Catch::Contains("pixel 0: a sum"));
   CHECK_THAT(fault([](Content& c) { c.pixels[0].dropped = 0xffffffff; }), Catch::Contains("number of samples"));
   CHECK_THAT(fault([&](Content& c) { c.info.renderingSeconds = infinity; }), Catch::Contains("a time"));
+  CHECK_THAT(fault([](Content& c) { c.info.passes[0].seconds = -1; }), Catch::Contains("a time"));
+  CHECK_THAT(fault([&](Content& c) { c.info.passes[0].seconds = infinity; }), Catch::Contains("a time"));
   CHECK_THAT(fault([](Content& c) { c.info.undersampledFraction = 2; }), Catch::Contains("undersampled"));
   CHECK_THAT(fault([](Content& c) { c.info.pilot->seconds = -1; }), Catch::Contains("time of a choice"));
   CHECK_THAT(fault([&](Content& c) { c.info.lightPathTrial->seconds = infinity; }),
