@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -24,7 +25,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Cells along a side of the stored grid of a target, and the memory for all grids of a cache.
+// Cells along a side of the stored grid of a target, and the memory for all grids of a cache that they are chosen for.
 constexpr int kMostCells = 80, kFewestCells = 16;
 constexpr double kGridBytes = 6e6;
 
@@ -127,7 +128,8 @@ Json pointJson(const Vec2& y) {
   return {shortNumber(y.x()), shortNumber(y.y())};
 }
 
-Json recordJson(const PagedCache& paged, std::size_t index, TargetGrids& grids) {
+/// grids: null without a lobe.
+Json recordJson(const PagedCache& paged, std::size_t index, TargetGrids* grids) {
   const CacheRecord& r = paged.cache->records()[index];
   const Vec3 wo = directionOf(*paged.cache, index);
   const Angles angles = anglesOf(wo);
@@ -147,8 +149,8 @@ Json recordJson(const PagedCache& paged, std::size_t index, TargetGrids& grids) 
   const PlottedRecord plotted(*paged.cache, static_cast<int>(index), paged.lobe);
   const PlotView view = plotted.view();
   json["view"] = {shortNumber(view.centre.x()), shortNumber(view.centre.y()), shortNumber(view.half)};
-  if (!paged.lobe) return json;
-  json["target_peak"] = grids.add(index, plotted, view);
+  if (!grids) return json;
+  json["target_peak"] = grids->add(index, plotted, view);
   const std::optional<Quality> grade = plotted.grade();
   json["worst_at"] = grade->worst > 0 ? pointJson(toDisc(grade->worstAt)) : Json();
   return json;
@@ -172,7 +174,7 @@ Json factsOf(const PagedCache& paged) {
 }
 
 /// With a lobe, a record takes milliseconds.
-Json recordsJson(const PagedCache& paged, TargetGrids& grids, const std::function<void()>& advance) {
+Json recordsJson(const PagedCache& paged, TargetGrids* grids, const std::function<void()>& advance) {
   std::vector<Json> records(paged.cache->records().size());
   parallelFor(std::size_t{0}, records.size(), [&](std::size_t i) {
     records[i] = recordJson(paged, i, grids);
@@ -200,9 +202,10 @@ Json cacheJson(const PagedCache& paged, const std::function<void()>& advance) {
             {"lookup", base64(lookup)},
             {"components", base64(std::as_bytes(cache.components()))},
             {"cells", 0}};
-  TargetGrids grids(cache.records().size());
-  json["records"] = recordsJson(paged, grids, advance);
-  if (paged.lobe) json.update(grids.json());
+  std::optional<TargetGrids> grids;
+  if (paged.lobe) grids.emplace(cache.records().size());
+  json["records"] = recordsJson(paged, grids ? &*grids : nullptr, advance);
+  if (grids) json.update(grids->json());
   return json;
 }
 

@@ -21,9 +21,10 @@ struct PagedCache {
 };
 
 /// The page shows the record that serves a chosen outgoing direction: target, fit and their ratio over the disc of
-/// incident directions, the components, and the grades. Targets are stored for every record as a grid of cells, which
-/// is coarser for caches of many records, so that the page has at most about 8 MB for each cache. Records
-/// are evaluated in parallel; advance is called after each of them, from any thread.
+/// incident directions, the components, and the grades. Targets and ratios are stored for every record as grids of
+/// cells, which are coarser for caches of many records. They take at most 8 MB of the page for each cache of up to 5800
+/// records; beyond that they have 16 × 16 cells, and take 1.4 kB for each record. Records are evaluated in parallel;
+/// advance is called after each of them, from any thread.
 std::string lobePage(std::span<const PagedCache> caches, const std::function<void()>& advance);
 
 /// The page shows a map of the records in the scene, and the mixture of the selected one. paths: of the files.
