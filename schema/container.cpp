@@ -10,6 +10,7 @@
 #include <xxhash.h>
 
 #include "runtime/core/files.h"
+#include "runtime/core/printable.h"
 
 namespace lobe {
 namespace {
@@ -35,14 +36,6 @@ std::uint64_t contentHash(const Header& header, std::span<const std::byte> paylo
 
 [[noreturn]] void refuse(const std::string& name, const std::string& fault) {
   throw std::runtime_error(name + ": " + fault);
-}
-
-/// Replaces unprintable characters, because the message may be written to a terminal.
-std::string printable(const char (&kind)[4]) {
-  std::string text(kind, sizeof(kind));
-  for (char& c : text)
-    if (c < ' ' || c > '~') c = '?';
-  return text;
 }
 
 void checkVersion(const FileFormat& format, const Header& header, const std::string& name) {
@@ -87,7 +80,8 @@ std::span<const std::byte> unwrapPayload(const FileFormat& format, std::span<con
     refuse(name, fmt::format("truncated: {} bytes, the header alone has {}", bytes.size(), sizeof(header)));
   std::memcpy(&header, bytes.data(), sizeof(header));
   if (std::memcmp(header.kind, format.kind.data(), sizeof(header.kind)) != 0)
-    refuse(name, fmt::format("a Lobe file of kind '{}', expected '{}'", printable(header.kind), nameOf(format)));
+    refuse(name, fmt::format("a Lobe file of kind '{}', expected '{}'", printable({header.kind, sizeof(header.kind)}),
+                             nameOf(format)));
   checkVersion(format, header, name);
   const std::span<const std::byte> payload = bytes.subspan(sizeof(header));
   if (header.payloadSize != payload.size())

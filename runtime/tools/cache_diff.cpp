@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "runtime/core/printable.h"
 #include "runtime/mixture/lookup.h"
 #include "runtime/tools/cache_grid.h"
 #include "runtime/tools/cache_report.h"
@@ -85,7 +86,7 @@ Angles anglesAt(const LobeCache& cache, int index) {
 void printFields(const CacheDifference& d, std::FILE* out) {
   if (d.fields.empty()) return;
   Table table({"", "A", "B"}, 3);
-  for (const FieldDifference& f : d.fields) table.add({f.name, f.a, f.b});
+  for (const FieldDifference& f : d.fields) table.add({f.name, printable(f.a), printable(f.b)});
   table.print(out);
   fmt::print(out, "\n");
 }

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "runtime/core/printable.h"
 #include "runtime/core/statistics.h"
 #include "runtime/tools/cache_grid.h"
 #include "runtime/tools/tool.h"
@@ -100,7 +101,7 @@ void printReports(const std::vector<CacheReport>& reports, bool showRun, std::FI
   for (const CacheReport& r : reports) {
     const CacheSummary& s = r.summary;
     const auto grade = [&](const std::string& text) { return s.graded ? text : "-"; };
-    std::vector<std::string> cells{r.lobe,
+    std::vector<std::string> cells{printable(r.lobe),
                                    std::to_string(s.records),
                                    s.graded ? fmt::format("{:.2f}", s.meanComponents) : "BSDF",
                                    grade(fmt::format("{:.3f}", s.nevMedian)),
@@ -172,10 +173,11 @@ void printHeader(const LobeCache& cache, const std::filesystem::path& path, std:
   const FitSettings& s = info.settings;
   const DirectionGrid grid = gridOf(cache);
   fmt::print(out, "{}\n", path.string());
-  fmt::print(out, "  lobe      {} (model {}, revision {})\n", info.summary, info.model, info.modelRevision);
-  fmt::print(out, "  key       {}\n", info.key);
-  fmt::print(out, "  written   by Lobe {}, format {}.{}, hash {:016x}\n", info.toolVersion, cache.header().major,
-             cache.header().minor, cache.hash());
+  fmt::print(out, "  lobe      {} (model {}, revision {})\n", printable(info.summary), printable(info.model),
+             info.modelRevision);
+  fmt::print(out, "  key       {}\n", printable(info.key));
+  fmt::print(out, "  written   by Lobe {}, format {}.{}, hash {:016x}\n", printable(info.toolVersion),
+             cache.header().major, cache.header().minor, cache.hash());
   fmt::print(out, "  fit       {}, {} components, {} samples, reduction {}, quality {}, revision {}\n",
              nameOf(s.method), s.components, s.samples, s.reduction, s.quality, s.revision);
   fmt::print(out, "  grid      {}, {} directions, {}\n", gridName(grid), grid.count,

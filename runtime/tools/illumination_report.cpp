@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "runtime/core/atomic_file.h"
+#include "runtime/core/printable.h"
 #include "runtime/tools/cache_report.h"
 #include "runtime/tools/tool.h"
 
@@ -113,16 +114,17 @@ Json toJson(const IlluminationFile& file, const std::filesystem::path& path, boo
 void printIllumination(const IlluminationFile& file, const std::filesystem::path& path, std::FILE* out) {
   const IlluminationInfo& info = file.info();
   const StoredTrainingSettings& s = info.settings;
-  fmt::print(out, "{}\n  scene      {}, hash {:016x}\n", path.string(), info.scene, info.sceneHash);
+  fmt::print(out, "{}\n  scene      {}, hash {:016x}\n", path.string(), printable(info.scene), info.sceneHash);
   fmt::print(out,
              "  settings   trained from {}, {} passes of {} photons and {} importons, {} components, seed {}, {} "
              "fractions{}\n",
-             s.from, s.passes, s.photons, s.importons, s.components, s.seed, s.learntFractions ? "learnt" : "fixed",
+             printable(s.from), s.passes, s.photons, s.importons, s.components, s.seed,
+             s.learntFractions ? "learnt" : "fixed",
              isLimited(s) ? fmt::format(", paths of up to {} segments", s.maxDepth) : "");
   fmt::print(out, "  training   {} particles; unit of length {:.4g}\n", info.particles, info.unit);
   fmt::print(out, "  records    {}, {:.2f} % undersampled\n", file.records().size(), 100 * info.undersampledFraction);
   fmt::print(out, "  format {}.{}, Lobe {}, {} bytes, hash {:016x}\n", file.header().major, file.header().minor,
-             info.toolVersion, file.bytes(), file.header().hash);
+             printable(info.toolVersion), file.bytes(), file.header().hash);
   std::vector<std::string> header{"over the records"};
   for (const Quantile& q : kQuantiles) header.emplace_back(q.name);
   Table table(std::move(header));

@@ -8,6 +8,7 @@
 #include "fitter/compile.h"
 #include "runtime/core/atomic_file.h"
 #include "runtime/core/files.h"
+#include "runtime/core/printable.h"
 #include "runtime/tools/cache_diff.h"
 #include "runtime/tools/cache_grid.h"
 #include "runtime/tools/cache_page.h"
@@ -171,7 +172,7 @@ std::string noLobe(const LobeCache& cache, const std::string& file, const Option
   return fmt::format(
       "{}: no material has the lobe of {} ({}, key {}); omit --scene, or give the scene and the -D options from "
       "which the cache was made",
-      o.scene, file, cache.info().summary, cache.info().key);
+      o.scene, file, printable(cache.info().summary), printable(cache.info().key));
 }
 
 /// The indices of the records that have a fit; of the one of --record only, if it is given.
@@ -188,7 +189,7 @@ std::vector<int> chosenRecords(const LobeCache& cache, const Options& o) {
   const std::vector<int> fits = recordsWithFit(cache, o);
   if (fits.empty())
     throw std::runtime_error(fmt::format("{} ({}): {} left to BSDF sampling, so there is no fit to draw", o.files[0],
-                                         cache.info().summary,
+                                         printable(cache.info().summary),
                                          o.record < 0 ? "all records are" : fmt::format("record {} is", o.record)));
   std::vector<int> chosen;
   for (const int i : spreadRecords(static_cast<int>(fits.size()), kPlotRows))
@@ -204,7 +205,7 @@ std::string pointText(const Vec2& y) {
 
 void printLegend(const LobeCache& cache, const Plot& plot, const Options& o) {
   fmt::print("{}: {} of {}, one row per record\n", o.plot, o.scene.empty() ? "fit" : "target, fit and ratio",
-             cache.info().summary);
+             printable(cache.info().summary));
   Table table(
       {"row", "record", "elevation", "azimuth", "comp.", "NEV", "worst f/p", "at x, y", "view x, y", "±", "peak"});
   for (std::size_t i = 0; i < plot.rows.size(); ++i) {

@@ -6,6 +6,7 @@
 #include "runtime/core/colour.h"
 #include "runtime/core/files.h"
 #include "runtime/core/numbers.h"
+#include "runtime/core/printable.h"
 #include "runtime/core/statistics.h"
 
 namespace lobe {
@@ -30,6 +31,18 @@ TEST_CASE("core: numbers out of range become zero or infinite") {
   CHECK(parseReal("1e400") == INFINITY);
   CHECK(parseReal("-1E400") == -INFINITY);
   CHECK(!parseNumber("1e400"));
+}
+
+TEST_CASE("core: control characters and bytes that are not UTF-8 are not printed") {
+  const std::string sound = "ggx α 0.1×0.3 ~ \xc2\xa0\xf0\x9f\x98\x80";
+  CHECK(printable(sound) == sound);
+  CHECK(printable("") == "");
+  CHECK(printable("a\x1b[2J\r\nb\t\x7f") == "a?[2J??b??");
+  CHECK(printable(std::string_view("a\0b", 3)) == "a?b");
+  CHECK(printable("\xc2\x9b"
+                  "1m|\x9b|\xc1\x9b|\xff|\xce") == "?1m|?|?|?|?");
+  CHECK(printable("\xe2\x82"
+                  "x\xf8\x80") == "??x??");
 }
 
 TEST_CASE("core: the sRGB transfer function and its inverse agree") {

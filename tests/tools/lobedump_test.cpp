@@ -16,6 +16,7 @@
 #include "runtime/tools/cache_diff.h"
 #include "runtime/tools/cache_page.h"
 #include "runtime/tools/cache_plot.h"
+#include "schema/illumination_file.h"
 #include "tests/support/fitter_test_lobes.h"
 #include "tests/support/json.h"
 #include "tests/support/tool_run.h"
@@ -480,6 +481,32 @@ TEST_CASE("fitter: lobedump shows all quantities of a record") {
   CHECK(json["summary"]["worst_ratio"].get<double>() >= r.worstRatio);
   for (const char* options : {"", "--records "})
     CHECK_THAT(folder.run("lobedump good.lobe " + std::string(options)).out, Catch::Contains("worst f/p"));
+}
+
+TEST_CASE("fitter: lobedump prints no control characters of files to the terminal") {
+  const Caches folder;
+  const std::string odd = "a\x1b]0;title\x07\nb", shown = "a?]0;title??b";
+  LobeCacheInfo info;
+  info.model = info.key = info.summary = info.toolVersion = odd;
+  info.gridCount = 1;
+  writeAtomically(folder / "odd.lobe",
+                  encodeLobeCache(info, std::vector{CacheRecord{}}, {}, std::vector<std::uint32_t>{0}));
+  IlluminationInfo trained;
+  trained.scene = trained.toolVersion = trained.settings.from = odd;
+  writeAtomically(folder / "odd.illum", encodeIllumination(trained, {}, {}));
+  const std::pair<const char*, int> commands[] = {{"lobedump odd.lobe", 0},
+                                                  {"lobedump odd.illum", 0},
+                                                  {"lobedump --diff odd.lobe good.lobe", 1},
+                                                  {"lobedump --plot x.png odd.lobe", 1},
+                                                  {"lobedump --html x.html --scene scene.xml odd.lobe", 1}};
+  for (const auto& [command, code] : commands) {
+    const ToolRun r = folder.run(command);
+    CAPTURE(command);
+    CHECK(r.code == code);
+    CHECK_THAT(r.out + r.error, Catch::Contains(shown) && !Catch::Contains("\x1b") && !Catch::Contains("\x07"));
+  }
+  CHECK(parseJson(folder.run("lobedump --json odd.lobe").out)[0]["lobe"] == odd);
+  CHECK(parseJson(folder.run("lobedump --json odd.illum").out)[0]["scene"] == odd);
 }
 
 TEST_CASE("fitter: lobedump shows no grades for a lobe without components") {
