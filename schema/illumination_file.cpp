@@ -33,7 +33,7 @@ void checkRecord(const StoredIllumination& r, std::size_t index, std::span<const
   const auto require = [&](bool condition, const char* fault) {
     if (!condition) refuseDamaged(name, fmt::format("record {}: {}", index, fault));
   };
-  require(allFinite({r.position[0], r.position[1], r.position[2], r.radius, r.irradiance, r.samples}),
+  require(allFinite({r.position[0], r.position[1], r.position[2], r.radius, r.irradiance, r.samples, r.likelihoodGain}),
           "a number is not finite");
   // These conditions are false for numbers that are not finite.
   require(isUnit(r.normal) && isUnit(r.tangent) && std::abs(dot(r.normal, r.tangent)) <= kFrameTolerance,

@@ -13,14 +13,14 @@
 
 namespace lobe {
 
-inline constexpr FileFormat kIlluminationFormat{{'I', 'L', 'L', 'U'}, 2, 2};
+inline constexpr FileFormat kIlluminationFormat{{'I', 'L', 'L', 'U'}, 3, 0};
 
 /// A record, read in place: the layout equals that of the schema (size checked at compile time, order of the fields by
 /// a test). A new field must be added here, to illumination.fbs, to the checks in illumination_file.cpp, and to
 /// runtime/guiding/illumination_store.cpp.
 struct StoredIllumination {
   std::array<float, 3> position, normal, tangent;
-  float radius, background, irradiance, samples, bsdfFraction;
+  float radius, background, irradiance, samples, bsdfFraction, likelihoodGain;
   std::uint32_t first, count;
 };
 

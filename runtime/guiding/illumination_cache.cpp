@@ -68,7 +68,7 @@ IlluminationCache::IlluminationCache(const std::vector<IlluminationRecord>& reco
     : unit_(unit), inverseCellSize_(kCellsPerUnit / unit) {
   std::uint32_t block = 0;
   for (const IlluminationRecord& r : records) {
-    places_.push_back({r.position, r.normal, r.radius, block});
+    places_.push_back({r.position, r.normal, r.radius, r.likelihoodGain, block});
     block += static_cast<std::uint32_t>((PackedRecord::bytesFor(r.count) + sizeof(Block) - 1) / sizeof(Block));
   }
   blocks_.resize(block);
@@ -151,6 +151,7 @@ IlluminationRecord IlluminationCache::unpacked(const PackedRecord& record) const
                        .irradiance = record.irradiance,
                        .samples = record.samples,
                        .bsdfFraction = record.bsdfFraction,
+                       .likelihoodGain = place.likelihoodGain,
                        .count = static_cast<std::int32_t>(record.count),
                        .components = {}};
   std::ranges::copy(unpackGaussians(record.gaussians()), r.components.begin());

@@ -28,6 +28,9 @@ struct IlluminationRecord {
   float irradiance;    ///< ∫ L cosθ dω of all light, in one unit for all records; 0 if not known
   float samples;       ///< number of particles seen in training
   float bsdfFraction;  ///< BSDF sampling fraction of the product, see BsdfSamplingFraction
+  /// The mean log-likelihood of the particles of the last pass, before the record learnt from them, less that of
+  /// cosine-weighted sampling (nats); 0 if not known.
+  float likelihoodGain = 0;
   std::int32_t count = 0;
   std::array<Gaussian, kMaxLightComponents> components;  ///< weights sum to 1
 
@@ -113,6 +116,7 @@ class IlluminationCache {
     Vec3 position;
     Vec3 normal;
     float radius;
+    float likelihoodGain;
     std::uint32_t block;
   };
   struct alignas(32) Block {

@@ -24,6 +24,7 @@ StoredIllumination stored(const IlluminationRecord& r, std::size_t first) {
           .irradiance = r.irradiance,
           .samples = r.samples,
           .bsdfFraction = r.bsdfFraction,
+          .likelihoodGain = r.likelihoodGain,
           .first = static_cast<std::uint32_t>(first),
           .count = static_cast<std::uint32_t>(r.count)};
 }
@@ -37,6 +38,7 @@ IlluminationRecord loaded(const StoredIllumination& s, std::span<const CacheComp
                             .irradiance = s.irradiance,
                             .samples = s.samples,
                             .bsdfFraction = s.bsdfFraction,
+                            .likelihoodGain = s.likelihoodGain,
                             .count = static_cast<std::int32_t>(s.count),
                             .components = {}};
   std::ranges::transform(components, record.components.begin(), [](const CacheComponent& c) {

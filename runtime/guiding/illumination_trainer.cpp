@@ -24,6 +24,12 @@ void require(bool condition, const char* field, const char* rule) {
   if (!condition) throw std::runtime_error(std::string("training option ") + field + " must be " + rule);
 }
 
+/// This mean log-likelihood less that of cosine-weighted sampling; 0 if one of them is not finite.
+float likelihoodGain(double likelihood, std::span<const WeightedPoint> points) {
+  const double gain = likelihood - meanLogLikelihood(points, {}, 1);
+  return std::isfinite(gain) ? static_cast<float>(gain) : 0;
+}
+
 /// A point where a record was created, or where none could be.
 struct Placed {
   Vec3 position, normal;
@@ -93,6 +99,7 @@ std::optional<double> IlluminationTrainer::updateAll(const ParticleNeighbours& n
     if (neighbours.carryFlux()) record.addIrradiance(found.irradiance);
     if (found.points.empty()) return;
     likelihoods[i] = meanLogLikelihood(found.points, record.em.gaussians(), record.em.background());
+    record.likelihoodGain = likelihoodGain(likelihoods[i], found.points);
     record.em.update(found.points);
     record.reservoir.add(found.points);
     shrinkRadius(record);
@@ -144,6 +151,7 @@ std::optional<IlluminationTrainer::Training> IlluminationTrainer::makeRecord(con
                   tangent,
                   std::clamp(found.radius, 0.1f * unit_, unit_),
                   found.distance,
+                  0,
                   0,
                   0,
                   StepwiseEm(options_.components),
@@ -200,6 +208,7 @@ void IlluminationTrainer::rebuildCache() {
     r.irradiance = t.irradiance;
     r.samples = static_cast<float>(t.em.samplesSeen());
     r.bsdfFraction = t.fraction.bsdf();
+    r.likelihoodGain = t.likelihoodGain;
     r.count = static_cast<std::int32_t>(t.em.gaussians().size());
     std::ranges::copy(t.em.gaussians(), r.components.begin());
   });

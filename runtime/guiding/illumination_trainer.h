@@ -61,6 +61,7 @@ class IlluminationTrainer {
     float distance;    // harmonic mean of the distances to the light's origin
     float irradiance;  // mean over the passes with photons since the record was created, also those without any near it
     int passes;        // number of these passes
+    float likelihoodGain;
     StepwiseEm em;
     BsdfSamplingFraction fraction;
     PointReservoir reservoir;  // of the points that em was trained with

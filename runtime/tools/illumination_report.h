@@ -20,7 +20,8 @@ void printIllumination(const IlluminationFile& file, const std::filesystem::path
 /// Prints a row for every record.
 void printRecords(const IlluminationFile& file, std::FILE* out);
 
-/// Writes the records as vertices of a binary PLY file: x y z, nx ny nz, radius, samples, background, bsdf_fraction.
+/// Writes the records as vertices of a binary PLY file: x y z, nx ny nz, radius, samples, background, bsdf_fraction,
+/// likelihood_gain.
 /// Throws std::runtime_error that names the file.
 void writePoints(const IlluminationFile& file, const std::filesystem::path& out);
 

@@ -126,6 +126,7 @@ TEST_CASE("guiding: records are packed without loss and up to four Gaussians tak
     records.back().count = count;
     records.back().irradiance = rng.uniform();
     records.back().bsdfFraction = rng.uniform();
+    records.back().likelihoodGain = rng.uniform();
     for (Gaussian& g : records.back().components)
       g = {rng.uniform(), rng.uniform(), rng.uniform(), {0.1f + rng.uniform(), 0.1f * rng.uniform(), 0.1f}};
   }
@@ -137,7 +138,7 @@ TEST_CASE("guiding: records are packed without loss and up to four Gaussians tak
     CHECK((a.position == b.position && a.normal == b.normal && a.tangent == b.tangent && a.radius == b.radius));
     CHECK(
         (a.background == b.background && a.irradiance == b.irradiance && a.samples == b.samples && a.count == b.count));
-    CHECK(a.bsdfFraction == b.bsdfFraction);
+    CHECK((a.bsdfFraction == b.bsdfFraction && a.likelihoodGain == b.likelihoodGain));
     const auto bytes = static_cast<std::size_t>(a.count) * sizeof(Gaussian);
     CHECK(std::memcmp(a.components.data(), b.components.data(), bytes) == 0);
   }
@@ -197,6 +198,24 @@ TEST_CASE("guiding: records that are fitted once more predict unseen particles b
   };
   CHECK(predicts(500, true) > predicts(500, false) + 0.003);
   CHECK(predicts(0, true) == predicts(0, false));
+}
+
+TEST_CASE("guiding: the likelihood gain of a record compares the last pass with cosine-weighted sampling") {
+  const Vec3 towards(0.6f, 0.0f, 0.8f), away(-0.8f, 0.0f, 0.6f);
+  const std::vector<RecordRequest> one(1, RecordRequest{{0.5f, 0.5f, 0}, Vec3::UnitZ()});
+  const auto gainAfter = [&](std::initializer_list<std::pair<Vec3, float>> passes) {
+    IlluminationTrainer trainer({}, 10.0f);
+    std::uint64_t seed = 100;
+    for (const auto& [direction, background] : passes)
+      learn(trainer, planeParticles(20000, direction, background, seed++), one);
+    trainer.refit();
+    REQUIRE(trainer.cache().size() == 1);
+    return trainer.cache().records().front().likelihoodGain;
+  };
+  CHECK(gainAfter({{towards, 0.3f}}) == 0);  // a new record has predicted nothing yet
+  CHECK(gainAfter({{towards, 0.3f}, {towards, 0.3f}}) > 1);
+  CHECK(gainAfter({{towards, 0.3f}, {away, 0.0f}}) < -1);
+  CHECK(gainAfter({{towards, 1}, {towards, 1}, {towards, 1}}) == Approx(0).margin(0.05));
 }
 
 TEST_CASE("guiding: training places records only near particles and no duplicates") {

@@ -24,6 +24,7 @@ IlluminationRecord randomRecord(Rng& rng) {
   r.irradiance = 5 * rng.uniform();
   r.samples = 1000 * rng.uniform();
   r.bsdfFraction = 0.05f + 0.9f * rng.uniform();
+  r.likelihoodGain = rng.uniform() - 0.5f;
   r.count = static_cast<std::int32_t>(9 * rng.uniform());
   if (r.count == 0) r.background = 1;
   for (int k = 0; k < r.count; ++k)
@@ -53,7 +54,8 @@ bool sameRecord(const IlluminationRecord& a, const IlluminationRecord& b) {
   };
   return a.position == b.position && a.normal == b.normal && a.tangent == b.tangent && a.radius == b.radius &&
          a.background == b.background && a.irradiance == b.irradiance && a.samples == b.samples &&
-         a.bsdfFraction == b.bsdfFraction && std::ranges::equal(a.gaussians(), b.gaussians(), same);
+         a.bsdfFraction == b.bsdfFraction && a.likelihoodGain == b.likelihoodGain &&
+         std::ranges::equal(a.gaussians(), b.gaussians(), same);
 }
 
 }  // namespace

@@ -275,7 +275,7 @@ TEST_CASE("lobedump: shows illumination as text and JSON and as a point cloud") 
   CHECK(folder.run("lobedump a.illum --points upper.PLY").code == 0);
   const std::string ply = folder.bytes("p.ply"), end = "end_header\n";
   CHECK_THAT(ply, Catch::StartsWith("ply\n") && Catch::Contains("element vertex " + std::to_string(records) + "\n"));
-  CHECK(ply.size() == ply.find(end) + end.size() + static_cast<std::size_t>(records) * 10 * sizeof(float));
+  CHECK(ply.size() == ply.find(end) + end.size() + static_cast<std::size_t>(records) * 11 * sizeof(float));
 
   const std::string lobe = folder.caches().front().string();
   CHECK(folder.run("lobedump a.illum " + lobe).code == 2);
