@@ -483,6 +483,13 @@ TEST_CASE("gradients: the weights at specular and glossy surfaces are those of e
           <transform name="to_world"><scale value="0.8"/><rotate x="1" angle="80"/><translate y="-1" z="0.9"/></transform>
           <bsdf type="roughdielectric"><float name="alpha" value="0.3"/></bsdf></shape>)",
         true},
+       // The rear of a blend of glass and metal, where the metal has no sample.
+       {"glass and metal seen from behind", std::string(kLamp) + kBackWall + kRough + R"(<shape type="rectangle">
+          <transform name="to_world"><scale value="0.8"/><rotate x="1" angle="-100"/><translate y="-1" z="0.9"/></transform>
+          <bsdf type="blendbsdf"><texture type="checkerboard" name="weight"><float name="uscale" value="5"/>
+          <float name="vscale" value="5"/><rgb name="color0" value="0.2"/><rgb name="color1" value="0.8"/></texture>
+          <bsdf type="dielectric"/><bsdf type="conductor"/></bsdf></shape>)",
+        false},
        // Camera and walls are in glass, and the light is outside.
        {"refracted light", std::string(kBackWall) + kRough + R"(<shape type="rectangle"><transform name="to_world">
           <scale value="6"/><rotate x="1" angle="3"/><translate z="2.2"/></transform><bsdf type="dielectric"/></shape>

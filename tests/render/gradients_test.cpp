@@ -2,7 +2,9 @@
 // against a dense solver, and paths in closed forms.
 
 #include <limits>
+#include <string>
 
+#include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
 #include <Eigen/Dense>
 #include <catch2/catch.hpp>
@@ -11,6 +13,7 @@
 #include "runtime/render/gradients/half_vector.h"
 #include "runtime/render/gradients/offset_path.h"
 #include "tests/support/render_test_tools.h"
+#include "tests/support/scenes_test_tools.h"
 
 using namespace lobe;
 using namespace lobe::test;
@@ -119,6 +122,36 @@ TEST_CASE("gradients: a connection has the Jacobian of finite differences") {
   const auto seen = [&](const Vec3& w) -> Vec3 { return w * (normal.dot(base) / normal.dot(w)) - base; };
   const auto shift = [&](const Vec3& w) -> Vec3 { return (seen(w) + offset).normalized(); };
   CHECK(jacobianOf(shift, base.normalized()) == Approx(connectionJacobian(normal, base, offset)).epsilon(0.01));
+}
+
+TEST_CASE("gradients: delta components are found wherever they have a sample, also beside metal seen from behind") {
+  const std::string glass = R"(<bsdf type="dielectric"/>)", metal = R"(<bsdf type="conductor"/>)";
+  const std::string parts = GENERATE_COPY(glass + metal, metal + glass);
+  const float weight = GENERATE(0.02f, 0.2f, 0.5f, 0.8f, 0.98f);
+  const float side = GENERATE(1.0f, -1.0f);
+  CAPTURE(parts, weight, side);
+  const Scene scene =
+      readBody(fmt::format(R"(<shape type="rectangle"><bsdf type="blendbsdf"><float name="weight" value="{}"/>{}</bsdf>
+        </shape>)",
+                           weight, parts));
+  const RenderScene ready(scene);
+  const std::optional<SurfaceHit> hit =
+      ready.tracer.trace({Vec3(0.1f, 0.2f, side), Vec3(0.2f, 0.1f, -side).normalized()});
+  REQUIRE(hit);
+  REQUIRE(hit->wo.z() * side > 0);
+  constexpr int kChoices = 1000;
+  int samples = 0;
+  for (int i = 0; i < kChoices; ++i) {
+    const std::optional<DeltaSample> sample = sampleDelta(*hit, (static_cast<float>(i) + 0.5f) / kChoices);
+    if (!sample) continue;
+    ++samples;
+    const std::optional<DeltaSample> found = deltaComponent(*hit, sample->component);
+    REQUIRE(found);
+    CHECK((found->wi == sample->wi));
+    CHECK(found->probability == sample->probability);
+  }
+  CHECK(samples > 0);
+  CHECK((samples < kChoices) == (side < 0));
 }
 
 TEST_CASE("gradients: the reconstruction is the solution of a dense least-squares solver") {

@@ -5,6 +5,47 @@
 #include "runtime/core/sampling.h"
 
 namespace lobe {
+namespace {
+
+/// Components of the delta part have intervals of `choice` in their order. Some intervals may have no sample, such as
+/// that of metal seen from behind: whether the component that is sought is below or above is then not known, and both
+/// sides are searched.
+class ComponentSearch {
+ public:
+  struct Point {
+    float choice;
+    std::optional<DeltaSample> sample;
+  };
+
+  ComponentSearch(const SurfaceHit& hit, double component) : hit_(hit), component_(component) {}
+
+  Point at(float choice) const { return {choice, sampleDelta(hit_, choice)}; }
+  bool isSought(const Point& point) const { return point.sample && point.sample->component == component_; }
+
+  /// Bisects an interval, after `depth` bisections, at whose ends the component is not.
+  std::optional<DeltaSample> between(const Point& low, const Point& high, int depth) const {
+    if (!mayContain(low, high, depth)) return std::nullopt;
+    const Point middle = at(0.5f * (low.choice + high.choice));
+    if (isSought(middle)) return middle.sample;
+    std::optional<DeltaSample> found = between(low, middle, depth + 1);
+    return found ? found : between(middle, high, depth + 1);
+  }
+
+ private:
+  static constexpr int kMostDepth = 24;
+  static constexpr int kMostDepthWithoutSamples = 6;  // bounds the number of all bisections
+
+  bool mayContain(const Point& low, const Point& high, int depth) const {
+    if (low.sample && low.sample->component > component_) return false;
+    if (high.sample && high.sample->component < component_) return false;
+    return depth < (low.sample || high.sample ? kMostDepth : kMostDepthWithoutSamples);
+  }
+
+  const SurfaceHit& hit_;
+  double component_;
+};
+
+}  // namespace
 
 bool scattersBroadly(const SurfaceHit& hit, const Rgb& f) {
   return luminance(f) * kPi <= kBroad * luminance(hit.bsdf->albedo(hit.wo, hit.uv));
@@ -26,20 +67,14 @@ float connectionJacobian(const Vec3& normal, const Vec3& base, const Vec3& offse
 }
 
 std::optional<DeltaSample> deltaComponent(const SurfaceHit& hit, double component) {
-  // Components have intervals of `choice` in their order. The first and the last are the most frequent.
-  float low = 0.0f, high = kOneMinusEpsilon;
-  for (const float choice : {low, high}) {
-    std::optional<DeltaSample> sample = sampleDelta(hit, choice);
-    if (sample && sample->component == component) return sample;
-  }
-  constexpr int kSteps = 24;
-  for (int i = 0; i < kSteps; ++i) {
-    const float middle = 0.5f * (low + high);
-    std::optional<DeltaSample> sample = sampleDelta(hit, middle);
-    if (!sample || sample->component == component) return sample;
-    (sample->component < component ? low : high) = middle;
-  }
-  return std::nullopt;
+  if (!(hit.bsdf->deltaProbability(hit.wo, hit.uv) > 0.0f)) return std::nullopt;
+  const ComponentSearch search(hit, component);
+  // The first and the last component are the most frequent.
+  const ComponentSearch::Point low = search.at(0.0f);
+  if (search.isSought(low)) return low.sample;
+  const ComponentSearch::Point high = search.at(kOneMinusEpsilon);
+  if (search.isSought(high)) return high.sample;
+  return search.between(low, high, 0);
 }
 
 void OffsetPath::scale(const Rgb& contribution, float density) {

@@ -39,7 +39,8 @@ bool correspond(const SurfaceHit& base, const Vec3& baseWi, const SurfaceHit& of
 /// the surface. base and offset: the vectors from the vertices to the point; normal: unit, of the surface.
 float connectionJacobian(const Vec3& normal, const Vec3& base, const Vec3& offset);
 
-/// The component of the delta part of the BSDF (DeltaSample::component); nullopt if there is none.
+/// The component of the delta part of the BSDF (DeltaSample::component); nullopt if there is none. An improbable
+/// component may not be found between others that have no sample.
 std::optional<DeltaSample> deltaComponent(const SurfaceHit& hit, double component);
 
 struct OffsetPath {

@@ -289,7 +289,7 @@ class ShiftedPath {
     }
     const SurfaceHit at = *offset.hit;
     const std::optional<DeltaSample> same =
-        offset.state == OffsetPath::State::apart ? deltaComponent(at, sample.component) : std::nullopt;
+        offset.state == OffsetPath::State::apart ? sharedComponent(base, at, sample.component) : std::nullopt;
     if (!same || !correspondDelta(base, sample, at, *same)) return offset.fail();
     const float ofBase = fraction * sample.probability;
     follow(at, same->weight * (same->probability / ofBase),
@@ -298,6 +298,13 @@ class ShiftedPath {
     weights.scatterDeltaOffset(i, at, *same);
     weights.copied(i);
     traceApart(at, same->wi, offset);
+  }
+
+  // The component at the offset vertex. Only if it is also found at the base vertex does the shift lead back.
+  static std::optional<DeltaSample> sharedComponent(const SurfaceHit& base, const SurfaceHit& at, double component) {
+    std::optional<DeltaSample> same = deltaComponent(at, component);
+    if (same && !deltaComponent(base, component)) same.reset();
+    return same;
   }
 
   static bool correspondDelta(const SurfaceHit& base, const DeltaSample& baseSample, const SurfaceHit& offset,
