@@ -1,6 +1,7 @@
 // Bidirectional path tracing, and path tracing with light paths, estimate the same image as path tracing for every kind
 // of light, material and camera, and the closed form in a furnace.
 
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
@@ -200,6 +201,24 @@ TEST_CASE("bidirectional: dark and hidden emitters and the maximum depth give th
     stage.options.maxDepth = GENERATE(1, 2, 3, 5);
   }
   CHECK(agreesWithPath(stage));
+}
+
+TEST_CASE("bidirectional: with a maximum depth of 0, the image of every integrator is black") {
+  Stage stage(sceneWith(std::string(kFloor) + kLamp + R"(<emitter type="constant">
+    <rgb name="radiance" value="0.5, 0.6, 0.7"/></emitter>)"));
+  const auto isBlack = [&](auto integrator) {
+    Film film(stage.camera.width(), stage.camera.height());
+    RenderOptions options;
+    options.samples = 4;
+    render(stage.camera, integrator, film, options);
+    return std::ranges::all_of(film.mean().pixels, [](const Rgb& pixel) { return (pixel == 0.0f).all(); });
+  };
+  CHECK_FALSE(isBlack(stage.bdpt()));
+  stage.options.maxDepth = 0;
+  CHECK(isBlack(stage.path()));
+  CHECK(isBlack(stage.pathWithLight()));
+  CHECK(isBlack(stage.bdpt()));
+  CHECK(isBlack(stage.vcm(0.05f)));
 }
 
 TEST_CASE("bidirectional: the radiance in a furnace is emission over one minus albedo", "[heavy]") {

@@ -1,6 +1,7 @@
 // Gradient-domain path tracing: the parts of the shift against finite differences and closed forms, the reconstruction
 // against a dense solver, and paths in closed forms.
 
+#include <algorithm>
 #include <limits>
 #include <string>
 
@@ -237,6 +238,24 @@ TEST_CASE("gradients: directly visible light has exact differences") {
   for (const Rgb& difference : film.dx().pixels) CHECK((difference == 0.0f).all());
   for (const Rgb& pixel : film.reconstruct(ReconstructionNorm::l2).image.pixels)
     CHECK(pixel.y() == Approx(0.5).epsilon(1e-6));
+}
+
+TEST_CASE("gradients: with a maximum depth of 0, the picture is black") {
+  const Scene scene = boxScene(std::make_shared<Diffuse>(0.6f), 0.5f);
+  const RenderScene ready(scene);
+  Camera lens = scene.camera;
+  lens.width = lens.height = 8;
+  const RayCamera camera(lens, scene.filter);
+  PathOptions options;
+  options.maxDepth = 0;
+  const auto isBlack = [&](const auto& integrator) {
+    GradientFilm film(8, 8);
+    render(camera, integrator, film, {1, 4, std::nullopt});
+    return std::ranges::all_of(film.reconstruct(ReconstructionNorm::l2).image.pixels,
+                               [](const Rgb& pixel) { return (pixel == 0.0f).all(); });
+  };
+  CHECK(isBlack(PathGradients(ready, camera, options)));
+  CHECK(isBlack(BdptGradients(ready, camera, options)));
 }
 
 TEST_CASE("gradients: visible emission does not spread to the pixels around it") {

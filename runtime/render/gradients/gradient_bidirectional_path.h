@@ -43,6 +43,7 @@ class GradientBidirectionalPath {
   /// offset paths.
   GradientSample trace(int x, int y, Sampler& lightRng, GradientSplats splats) {
     ++statistics_.paths;
+    if (options_.maxDepth < 1) return result_;
     connector_.traceLightPath(lightRng, statistics_, light_);
     for (std::size_t i = 0; i < light_.vertices.size(); ++i) connectToCamera(i, splats);
     paths_.start(x, y);

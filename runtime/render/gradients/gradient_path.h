@@ -58,6 +58,7 @@ class GradientPath {
   /// Traces a base path through a random point of the pixel, with its offset paths.
   GradientSample trace(int x, int y) {
     ++statistics_.paths;
+    if (options_.maxDepth < 1) return result_;
     paths_.start(x, y);
     while (arrive() && scatter()) {
     }

@@ -320,6 +320,7 @@ class BidirectionalPaths {
   // ---- Camera path
 
   void traceCameraPath(Sample& sample, const Ray& ray) const {
+    if (options_.maxDepth < 1) return;
     const bool dark = options_.emitterVisibility != EmitterVisibility::shown;
     std::optional<SurfaceHit> hit = scene_.firstVisible(ray, options_.emitterVisibility, sample.statistics.segments);
     if (!hit) {
