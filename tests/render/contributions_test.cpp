@@ -1,11 +1,15 @@
 // The largest contributions, and the limit of indirect light (--firefly-limit).
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
 
 #include <oneapi/tbb/global_control.h>
 #include <catch2/catch.hpp>
 
 #include "runtime/core/random.h"
+#include "runtime/render/gradients/gradient_integrator.h"
 #include "tests/support/batches.h"
 #include "tests/support/scenes_test_tools.h"
 
@@ -74,6 +78,40 @@ void checkLimit(Stage& stage, const MakeIntegrator& make) {
   const Rendered kept = rendered(stage, make());
   CHECK(kept.sum == direct);
   CHECK(kept.statistics.cut.units == 0);
+}
+
+/// Contributions of single samples, sorted by kind.
+using ByKind = std::vector<std::pair<std::uint32_t, float>>;
+
+ByKind byKind(const LargestContributions& largest) {
+  ByKind result;
+  for (const LargestContributions::Key key : largest.keys)
+    if (key != 0) result.emplace_back(static_cast<std::uint32_t>(key), LargestContributions::luminanceOf(key));
+  std::ranges::sort(result);
+  return result;
+}
+
+bool agree(const ByKind& a, const ByKind& b) {
+  return std::ranges::equal(a, b, [](const auto& x, const auto& y) {
+    return x.first == y.first && std::abs(x.second - y.second) <= 1e-3f * y.second;
+  });
+}
+
+/// Checks that samples of gradients have the contributions of other samples. Both: from column, row and index to the
+/// statistics.
+template <class OfGradients, class OfOther>
+void checkSameContributions(const Stage& stage, const OfGradients& ofGradients, const OfOther& ofOther) {
+  int samples = 0, different = 0, found = 0;
+  for (int y = 0; y < stage.camera.height(); ++y)
+    for (int x = 0; x < stage.camera.width(); ++x)
+      for (int s = 0; s < 16; ++s) {
+        const ByKind gradients = byKind(ofGradients(x, y, s).largest), other = byKind(ofOther(x, y, s).largest);
+        ++samples;
+        different += !agree(gradients, other);
+        found += !other.empty();
+      }
+  CHECK(found > samples / 2);
+  CHECK(different <= 0.001 * samples);  // rounding
 }
 
 }  // namespace
@@ -148,6 +186,54 @@ TEST_CASE("contributions: the largest say what kind of path they come from") {
   CHECK(anyOf(ofPath, Technique::emission));
   CHECK_FALSE(anyOf(ofPath, Technique::lightTracing));
   CHECK(anyOf(ofLight, Technique::lightTracing));
+}
+
+TEST_CASE("contributions: gradients have those of the same paths without gradients") {
+  const Stage stage(causticScene());
+  const auto pixelOf = [&](int x, int y) { return static_cast<std::uint64_t>(y) * stage.camera.width() + x; };
+  const auto sampler = [&](int x, int y, int s) {
+    return Sampler::stratified(1, pixelOf(x, y), static_cast<std::uint32_t>(s));
+  };
+  const auto lightSampler = [&](int x, int y, int s) {
+    return Sampler(2, pixelOf(x, y), static_cast<std::uint64_t>(s));
+  };
+  SECTION("path") {
+    const PathIntegrator path = stage.path();
+    const PathGradients gradients(stage.ready, stage.camera, stage.options);
+    const auto ofGradients = [&](int x, int y, int s) {
+      PathStatistics statistics;
+      Sampler rng = sampler(x, y, s);
+      gradients.sample(x, y, rng, statistics);
+      return statistics;
+    };
+    checkSameContributions(stage, ofGradients, [&](int x, int y, int s) {
+      PathStatistics statistics;
+      Sampler rng = sampler(x, y, s);
+      const Ray ray = stage.camera.rayThrough(x, y, stage.camera.sample(rng));
+      path.radiance(ray, rng, statistics);
+      return statistics;
+    });
+  }
+  SECTION("bdpt") {
+    const BdptIntegrator bdpt = stage.bdpt();
+    const BdptGradients gradients(stage.ready, stage.camera, stage.options);
+    const auto ofGradients = [&](int x, int y, int s) {
+      PathStatistics statistics;
+      Sampler rng = sampler(x, y, s), lightRng = lightSampler(x, y, s);
+      GradientSplatLists lists;
+      for (auto& list : lists) list.assign(1, {});
+      gradients.sample(x, y, rng, lightRng, statistics, GradientSplats(lists, 0));
+      return statistics;
+    };
+    checkSameContributions(stage, ofGradients, [&](int x, int y, int s) {
+      PathStatistics statistics;
+      Sampler rng = sampler(x, y, s), lightRng = lightSampler(x, y, s);
+      std::vector<Splat> splats;
+      const Ray ray = stage.camera.rayThrough(x, y, stage.camera.sample(rng));
+      bdpt.radiance(ray, rng, lightRng, statistics, &splats);
+      return statistics;
+    });
+  }
 }
 
 TEST_CASE("contributions: largest and cut do not depend on threads") {

@@ -77,6 +77,7 @@ class GradientBidirectionalPath {
     const Contribution base(viewed->value, total, total);
     const Vec2& film = viewed->view.film;
     GradientSample sample{base.weighted()};
+    statistics_.largest.add(luminance(sample.radiance), {Technique::lightTracing, vertex.depth + 1, vertex.delta});
     for (std::size_t d = 0; d < kNeighbours.size(); ++d)
       sample.differences[d] =
           weightedDifference(base, shiftedToPixel(i, *viewed, film + Vec2(kNeighbours[d][0], kNeighbours[d][1])));
@@ -150,8 +151,21 @@ class GradientBidirectionalPath {
     if (paths_.depth > 1)
       addEmission();
     else if (options_.emitterVisibility == EmitterVisibility::shown)
-      result_.visible += emitted(paths_.hit, paths_.direction);
+      addVisible();
     return paths_.arrive();
+  }
+
+  void addVisible() {
+    const Rgb radiance = emitted(paths_.hit, paths_.direction);
+    result_.visible += radiance;
+    statistics_.largest.add(luminance(radiance), {Technique::emission, paths_.depth, false});
+  }
+
+  // Adds the weighted contribution of the base path.
+  void add(const Contribution& base, const PathKind& kind) {
+    const Rgb value = base.weighted();
+    result_.radiance += value;
+    statistics_.largest.add(luminance(value), kind);
   }
 
   void addEmission() {
@@ -160,7 +174,7 @@ class GradientBidirectionalPath {
     const auto& weights = paths_.weights;
     Contribution base(paths_.throughput * radiance, 1.0,
                       totalOfEmission(weights.base.all, weights.base.nextEvent, paths_.hit, paths_.direction));
-    result_.radiance += base.weighted();
+    add(base, {Technique::emission, paths_.depth, paths_.byDelta});
     for (std::size_t i = 0; i < paths_.offsets.size(); ++i) {
       const OffsetPath& offset = paths_.offsets[i];
       std::optional<Contribution> shifted;
@@ -217,13 +231,13 @@ class GradientBidirectionalPath {
   // `total` of PartialWeights. scale: one over the density of the connection. offsetOf(i, scattering): that of offset
   // path i, if it has a vertex of its own, relative to the base path.
   template <class AnyConnection, class OffsetOf>
-  void add(const AnyConnection& connection, double scale, const OffsetScatterings& scatterings,
+  void add(const AnyConnection& connection, const PathKind& kind, double scale, const OffsetScatterings& scatterings,
            const OffsetOf& offsetOf) {
     const auto& weights = paths_.weights;
     const double scale2 = squared(scale);
     Contribution base(paths_.throughput * connection.value * toFloat(scale), 1.0,
                       scale2 * connection.total(weights.base.all));
-    result_.radiance += base.weighted();
+    add(base, kind);
     for (std::size_t i = 0; i < paths_.offsets.size(); ++i) {
       const OffsetPath& offset = paths_.offsets[i];
       std::optional<Contribution> shifted;
@@ -257,7 +271,7 @@ class GradientBidirectionalPath {
     const auto base = connector_.connection(at.hit, at.vertex, 1.0f - at.delta, light, &statistics_);
     if (!base) return;
     const Vec3 baseDirection = light.hit.position - at.hit.position;
-    add(*base, 1.0, scatterings,
+    add(*base, {Technique::connection, paths_.depth + light.depth + 1, light.delta}, 1.0, scatterings,
         [&](std::size_t i, const OffsetScattering& scattering, bool& alike) -> std::optional<Contribution> {
           const OffsetPath& offset = paths_.offsets[i];
           const bool apart = offset.state == State::apart;
@@ -280,7 +294,7 @@ class GradientBidirectionalPath {
     if (!light) return;
     const auto base = connector_.lightConnection(at.hit, at.vertex, 1.0f - at.delta, *light, &statistics_);
     if (!base) return;
-    add(*base, 1.0 / base->density, scatterings,
+    add(*base, {Technique::nextEvent, paths_.depth + 1, false}, 1.0 / base->density, scatterings,
         [&](std::size_t i, const OffsetScattering& scattering, bool& alike) -> std::optional<Contribution> {
           const OffsetPath& offset = paths_.offsets[i];
           const bool apart = offset.state == State::apart;

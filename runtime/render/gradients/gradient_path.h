@@ -76,8 +76,21 @@ class GradientPath {
     if (paths_.depth > 1)
       addEmission();
     else if (options_.emitterVisibility == EmitterVisibility::shown)
-      result_.visible += emitted();
+      addVisible();
     return paths_.arrive();
+  }
+
+  void addVisible() {
+    const Rgb radiance = emitted();
+    result_.visible += radiance;
+    statistics_.largest.add(luminance(radiance), {Technique::emission, paths_.depth, false});
+  }
+
+  // Adds the weighted contribution of the base path.
+  void add(const Contribution& base, const PathKind& kind) {
+    const Rgb value = base.weighted();
+    result_.radiance += value;
+    statistics_.largest.add(luminance(value), kind);
   }
 
   Rgb emitted() const {
@@ -88,7 +101,7 @@ class GradientPath {
     const Rgb radiance = emitted();
     if (!(radiance.maxCoeff() > 0.0f)) return;
     const Contribution base(paths_.throughput * radiance, 1.0, total(paths_.weights.base, paths_.hit));
-    result_.radiance += base.weighted();
+    add(base, {Technique::emission, paths_.depth, paths_.byDelta});
     for (std::size_t i = 0; i < paths_.offsets.size(); ++i)
       result_.differences[i] +=
           weightedDifference(base, emissionOf(i), paths_.offsets[i].state != OffsetPath::State::apart);
@@ -139,7 +152,7 @@ class GradientPath {
     const Direct direct{*light, wi, f, arriving, f * arriving.radiance * (std::abs(wi.z()) / light->pdf)};
     const float pdf = light->delta ? 0.0f : (1.0f - at.delta) * at.vertex.pdf(wi);
     const Contribution base(paths_.throughput * direct.scattered, 1.0f, 1.0f + squared(pdf / light->pdf));
-    result_.radiance += base.weighted();
+    add(base, {Technique::nextEvent, paths_.depth + arriving.rays, arriving.rays > 1});
     for (std::size_t i = 0; i < paths_.offsets.size(); ++i) {
       bool sameShift = true;
       const std::optional<Contribution> offset =

@@ -139,6 +139,7 @@ class ShiftedPath {
 
   /// Scatters the paths by the non-delta component, and traces them to the next vertex; returns false if they end.
   bool scatterSmooth(const Scattering& at, const OffsetScatterings& scatterings) {
+    byDelta = false;
     const std::optional<BsdfSample> sample = at.vertex.sample(rng_, statistics_);
     if (!sample) return false;
     const float pdf = (1.0f - at.delta) * sample->pdf;
@@ -155,6 +156,7 @@ class ShiftedPath {
   /// The same for delta components, which are sampled with the probability `fraction`.
   bool scatterDelta(const SurfaceHit& at, float fraction) {
     statistics_.countDelta();
+    byDelta = true;
     const std::optional<DeltaSample> sample = sampleDelta(at, rng_.uniform());
     if (!sample) return false;
     weights.scatterDelta(at, *sample);
@@ -168,6 +170,7 @@ class ShiftedPath {
   std::optional<SurfaceHit> hit;  ///< where the base path has arrived; nullopt: it has left the scene
   Vec3 direction = Vec3::Zero();  ///< in which it has arrived
   int depth = 0;                  ///< segments up to there
+  bool byDelta = false;           ///< the last scattering was by a delta component
   Rgb throughput = Rgb::Ones();
   std::array<OffsetPath, kNeighbours.size()> offsets;
   Weights weights;
