@@ -139,6 +139,24 @@ TEST_CASE("features: glass with two sides bends the ray") {
   CHECK(albedoAt(0.01f) == Approx(0.8f));
 }
 
+// From behind, the metal has no sample.
+TEST_CASE("features: the rear of a pane that is blended with metal shows what is behind it") {
+  const double ofGlass = GENERATE(0.15, 0.5, 0.8);
+  const bool metalFirst = GENERATE(true, false);
+  CAPTURE(ofGlass, metalFirst);
+  Parameters parameters;
+  parameters.set("weight", metalFirst ? ofGlass : 1 - ofGlass);  // of the second part
+  for (const bool isMetal : {metalFirst, !metalFirst})
+    parameters.addChild(isMetal ? makeBsdf("conductor", Parameters()) : glass("thindielectric"));
+  Scene scene = wall();
+  addShape(scene, rectangle({-50, -50, 2}, {100, 0, 0}, {0, 100, 0}),
+           addMaterial(scene, makeBsdf("blendbsdf", parameters)));
+  const Features f = along(scene, {0, 0, 1});
+  CHECK((f.albedo - kAlbedo).abs().maxCoeff() < 1e-6f);
+  CHECK(near(f.normal, {0, 0, -1}));
+  CHECK(f.depth == Approx(2));
+}
+
 TEST_CASE("features: surfaces through which everything passes have no depth") {
   Scene scene = wall();
   addShape(scene, rectangle({-50, -50, 1}, {0, 100, 0}, {100, 0, 0}), addMaterial(scene, makeBsdf("null", {})));

@@ -9,9 +9,10 @@
 namespace lobe {
 namespace {
 
-constexpr int kMostSurfaces = 16;          // on one way, of specular surfaces
-constexpr float kLeastProbability = 0.1f;  // of a way that is followed
-constexpr float kRounding = 1e-4f;         // more than that of probabilities
+constexpr int kMostSurfaces = 16;                // on one way, of specular surfaces
+constexpr float kLeastProbability = 0.1f;        // of a way that is followed
+constexpr float kRounding = 1e-4f;               // more than that of probabilities
+constexpr float kStepWithoutSample = 1.0f / 64;  // of the choice, less than the probability of ways that are followed
 
 /// Whether everything passes straight through a surface.
 bool isInvisible(const SurfaceHit& hit) {
@@ -57,7 +58,11 @@ class SpecularTree {
     std::optional<DeltaSample> likeliest, last;
     for (float choice = 0; choice < 1.0f && ways.count < ways.all.size();) {
       const std::optional<DeltaSample> way = sampleDelta(hit, choice);
-      if (!way) break;
+      // A component may have no sample, such as metal seen from behind in a blend with glass.
+      if (!way) {
+        choice += kStepWithoutSample;
+        continue;
+      }
       // Because of rounding, a choice at the end of the last component may return it again.
       const bool again = last && way->component == last->component;
       choice += again ? kRounding : std::max(way->probability, kRounding);
