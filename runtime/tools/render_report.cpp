@@ -92,6 +92,18 @@ nlohmann::ordered_json asJson(const LargestContributions& largest) {
   return list;
 }
 
+/// Whether the statistics of paths are those of all samples of the picture. Those of samples that not all pixels have
+/// may be missing, because a run that is resumed makes such samples again (renderer.cpp).
+bool coverPicture(const RunResult& run) {
+  const auto [least, most] = run.film.sampleRange();
+  return least == most;
+}
+
+nlohmann::ordered_json meanPathLength(const PathStatistics& paths) {
+  if (paths.paths == 0) return nullptr;
+  return static_cast<double>(paths.segments) / static_cast<double>(paths.paths);
+}
+
 /// The light that --firefly-limit has cut off, as a fraction of the sum of the picture without the limit.
 double cutFraction(const RenderJob& job, const RunResult& run) {
   const double cut = run.render.statistics.cut.times(*job.fireflyLimit);
@@ -107,6 +119,7 @@ nlohmann::ordered_json statistics(const RenderJob& job, std::uint64_t sceneHash,
                                   const RunResult& run) {
   const PathStatistics& paths = run.render.statistics;
   const RenderProgress& total = run.render.total;
+  const bool known = coverPicture(run);
   nlohmann::ordered_json passes = nlohmann::ordered_json::array();
   for (const PassReport& pass : run.training().passes) passes.push_back(asJson(pass));
   return {{"version", LOBE_VERSION},
@@ -129,7 +142,7 @@ nlohmann::ordered_json statistics(const RenderJob& job, std::uint64_t sceneHash,
           {"rays", paths.rays()},
           {"path_segments", paths.segments},
           {"segments_per_second", static_cast<double>(paths.segments) / total.seconds},
-          {"mean_path_length", static_cast<double>(paths.segments) / static_cast<double>(paths.paths)},
+          {"mean_path_length", known ? meanPathLength(paths) : nullptr},
           {"peak_rss_bytes", peakResidentBytes()},
           {"training_passes", passes},
           {"training_particles", run.training().particles()},
@@ -142,8 +155,8 @@ nlohmann::ordered_json statistics(const RenderJob& job, std::uint64_t sceneHash,
           {"lobe_bytes", run.guiding.caches ? run.guiding.caches->bytes() : 0},
           {"strategy_fractions", fractionsOf(paths.strategies, kScatteringNames)},
           {"guiding_decisions", fractionsOf(paths.decisions, kGuidingDecisionNames)},
-          {"firefly_cut_fraction", job.fireflyLimit ? nlohmann::ordered_json(cutFraction(job, run)) : nullptr},
-          {"largest_contributions", asJson(paths.largest)},
+          {"firefly_cut_fraction", job.fireflyLimit && known ? nlohmann::ordered_json(cutFraction(job, run)) : nullptr},
+          {"largest_contributions", known ? asJson(paths.largest) : nullptr},
           {"nonfinite_samples", run.film.dropped()}};
 }
 
@@ -160,7 +173,7 @@ ImageAttributes attributes(const RenderJob& job, std::uint64_t sceneHash, const 
     all["interrupted"] = fmt::format("{} to {} samples per pixel", least, most);
   if (job.fireflyLimit) {
     all["fireflyLimit"] = static_cast<double>(*job.fireflyLimit);
-    all["fireflyCut"] = cutFraction(job, run);
+    if (coverPicture(run)) all["fireflyCut"] = cutFraction(job, run);
   }
   if (run.guiding.usesLightPaths) all["lightPathsPerPixel"] = run.guiding.lightPaths->pathsPerPixel;
   if (run.guiding.caches) all["cacheHashes"] = fmt::format("{:016x}", fmt::join(run.guiding.caches->hashes(), " "));

@@ -356,7 +356,9 @@ TEST_CASE("loberender: an interrupted render writes the picture so far") {
 
 TEST_CASE("loberender: a render that is interrupted in its first pass says that pixels are black") {
   const SceneFolder folder(false);
-  Background render(folder, kPath + " -o a.exr --spp 1000000 --size 1200x900 --checkpoint run.ckpt");
+  Background render(folder, kPath +
+                                " -o a.exr --stats s.json --spp 1000000 --size 1200x900 --firefly-limit 1 "
+                                "--checkpoint run.ckpt");
   waitFor([&] { return folder.has("run.ckpt"); });  // written before the first pass
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
   render.send(SIGINT);
@@ -368,6 +370,12 @@ TEST_CASE("loberender: a render that is interrupted in its first pass says that 
                        std::get<AttributeText>(attributes.at("interrupted")).starts_with("0 to 1 ");
   CAPTURE(folder.bytes("error"));
   CHECK(isFirst == (folder.bytes("error").find("; pixels without a sample are black") != std::string::npos));
+  // The statistics lack the samples that not all pixels have.
+  const bool partial = attributes.contains("interrupted");
+  const auto statistics = parseJson(folder.bytes("s.json"));
+  for (const char* key : {"mean_path_length", "largest_contributions", "firefly_cut_fraction"})
+    CHECK(statistics[key].is_null() == partial);
+  CHECK(attributes.contains("fireflyCut") != partial);
 }
 
 TEST_CASE("loberender: the message of an interrupted render says what could not be written") {
