@@ -1,6 +1,7 @@
 // Integrators compared with closed forms and with each other.
 
 #include <cstring>
+#include <limits>
 
 #include <oneapi/tbb/global_control.h>
 
@@ -470,6 +471,28 @@ TEST_CASE("render: the time limit ends a render after whole samples") {
   Film same(camera.width, camera.height);
   render(RayCamera(camera, {}), PathIntegrator(ready, {}), same, options);
   CHECK(sameFilm(same, film));
+}
+
+TEST_CASE("render: a timed render ends where the numbers of samples end") {
+  constexpr int kMost = std::numeric_limits<int>::max(), kFirst = 5, kLeft = 3;
+  Film::Pixel pixel;
+  pixel.count = kMost - kFirst - kLeft;
+  Film film(1, 1, {pixel});
+  Camera camera;
+  camera.width = camera.height = 1;
+  RenderOptions options;
+  options.seconds = 0.5;
+  options.firstSample = kFirst;
+  int samples = 0;
+  const AddSample addSample = [&](int x, int y, Sampler&, PathStatistics&) {
+    film.add(x, y, Rgb::Ones());
+    ++samples;
+  };
+  const RenderResult result = render(RayCamera(camera, {}), addSample, film, options);
+  CHECK(samples == kLeft);
+  CHECK(result.total.samples == kMost - kFirst);
+  CHECK(result.total.seconds < 0.5);
+  CHECK_FALSE(result.stopped);
 }
 
 TEST_CASE("render: invalid render options are errors") {

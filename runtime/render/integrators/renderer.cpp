@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <vector>
 
@@ -338,7 +339,7 @@ class WavePlan {
     const double longest =
         std::min(options_.seconds ? *options_.seconds / kWavesPerBudget : kWaveSeconds, options_.longestWave);
     const double wanted = std::clamp(longest / cost, 1.0, static_cast<double>(progress.samples));
-    return static_cast<int>(std::max(0.0, std::min(wanted, left(progress, cost))));
+    return static_cast<int>(std::max(0.0, std::min({wanted, left(progress, cost), room(progress)})));
   }
 
  private:
@@ -349,6 +350,11 @@ class WavePlan {
     if (options_.samples) return *options_.samples - progress.samples;
     // A sample that mostly fits is still rendered, so that the budget is met on average.
     return (*options_.seconds - progress.seconds) / cost + std::min(0.5, 0.01 * *options_.seconds / cost);
+  }
+
+  // The number of further samples whose indices fit an int.
+  double room(const RenderProgress& progress) const {
+    return std::numeric_limits<int>::max() - options_.firstSample - progress.samples;
   }
 
   RenderOptions options_;

@@ -31,8 +31,9 @@ struct RenderResult;
 /// Exactly one of samples and seconds is set.
 struct RenderOptions {
   std::uint64_t seed = 1;
-  std::optional<int> samples;     ///< per pixel: the same image for a seed, on any number of threads
-  std::optional<double> seconds;  ///< stops when another wave would not fit; renders at least one sample per pixel
+  std::optional<int> samples;  ///< per pixel: the same image for a seed, on any number of threads
+  /// Stops when another wave would not fit, or where the indices of samples end; renders at least one sample per pixel.
+  std::optional<double> seconds;
   PixelSampling sampling = PixelSampling::sobol;
   PixelFiltering filtering = PixelFiltering::splatting;
   int firstSample = 0;             ///< index of the first sample of every pixel; firstSample + samples must fit an int
