@@ -6,6 +6,7 @@
 #include <oneapi/tbb/global_control.h>
 
 #include "runtime/render/integrators/renderer.h"
+#include "runtime/render/lights/delta_lights.h"
 #include "runtime/render/training/light_learning.h"
 #include "tests/support/agreement.h"
 #include "tests/support/chi2.h"
@@ -144,7 +145,8 @@ TEST_CASE("render: each light is chosen with its probability") {
     const LightSelection lights = ready.lights.at(at);
     // Area lights have numbers in the order of their shapes; delta lights follow.
     std::vector<double> expected;
-    const int count = 92 + static_cast<int>(scene.lights.size());
+    constexpr int kAreaLights = 92;
+    const int count = kAreaLights + static_cast<int>(scene.lights.size());
     for (int light = 0; light < count; ++light) expected.push_back(lights.probability(light));
     double sum = std::accumulate(expected.begin(), expected.end(), 0.0);
     double tiles = 0;
@@ -153,18 +155,23 @@ TEST_CASE("render: each light is chosen with its probability") {
     CHECK(sum < 1);
     // Delta lights return the probability of their choice.
     Rng rng(3);
-    int directional = 0;
     constexpr int kSamples = 200000;
-    float pdf = 0;
+    std::vector<int> counts(expected.size());
+    int wrong = 0;
     for (int i = 0; i < kSamples; ++i) {
       const double choice = rng.uniformDouble();
       const auto light = lights.sample(choice, rng.uniform2());
-      if (!light || !light->delta || light->source) continue;
-      ++directional;
-      pdf = light->pdf;
+      if (!light || !light->delta) continue;
+      ++counts[light->light];
+      wrong += std::abs(light->pdf - expected[light->light]) > 1e-4 * light->pdf;
     }
-    CHECK(pdf == lights.probability(count - 1));
-    CHECK(std::abs(directional - pdf * kSamples) < kMaxDeviation * std::sqrt(pdf * kSamples) + 1);
+    CHECK(wrong == 0);
+    for (int light = kAreaLights; light < count; ++light) {
+      CAPTURE(at.position.transpose(), light);
+      const bool shines = illuminate(scene.lights[light - kAreaLights], at.position).has_value();
+      const double samples = shines ? expected[light] * kSamples : 0;
+      CHECK(std::abs(counts[light] - samples) < kMaxDeviation * std::sqrt(samples) + 1);
+    }
   }
 }
 
