@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
+#include <set>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -310,23 +312,45 @@ void keepTransport(ReadContext& context, pugi::xml_node node, Parameters& parame
   }
 }
 
-/// The transport of the integrator or, if it contains another one, of the inner one.
-LightTransport readTransportOf(ReadContext& context, pugi::xml_node node) {
-  const std::string type = node.attribute("type").value();
-  std::optional<LightTransport> nested;
-  const auto onChild = [&](pugi::xml_node child, const std::string&, Parameters&) {
-    if (elementName(child) == "integrator") nested = readTransportOf(context, child);
-    return true;  // other children only configure the integrator
-  };
-  if (std::ranges::find(kNotRadiance, type) != kNotRadiance.end())
-    context.unsupported(node, "integrator " + type, fmt::format("integrator \"{}\" does not compute radiance", type),
-                        "radiance is rendered");
-  Parameters parameters = readParameters(context, node, "integrator", onChild);
-  if (std::ranges::find(kPathTracers, type) == kPathTracers.end()) keepTransport(context, node, parameters);
-  const LightTransport own =
-      makeFrom(context, node, parameters, [&](const Parameters& p) { return readTransport(type, p); });
-  return nested.value_or(own);
-}
+/// Reads an integrator and those that are nested in it.
+class TransportReader {
+ public:
+  explicit TransportReader(ReadContext& context) : context_(context) {}
+
+  /// The transport of the integrator or, if it contains another one, of the inner one.
+  LightTransport read(pugi::xml_node node) {
+    const Nesting nesting(context_, node, depth_);
+    read_.insert(SceneFile::location(node));
+    const std::string type = node.attribute("type").value();
+    std::optional<LightTransport> nested;
+    const auto onChild = [&](pugi::xml_node child, const std::string&, Parameters&) {
+      if (elementName(child) == "integrator" && isNew(child)) nested = read(child);
+      return true;  // other children only configure the integrator
+    };
+    if (std::ranges::find(kNotRadiance, type) != kNotRadiance.end())
+      context_.unsupported(node, "integrator " + type, fmt::format("integrator \"{}\" does not compute radiance", type),
+                           "radiance is rendered");
+    Parameters parameters = readParameters(context_, node, "integrator", onChild);
+    if (std::ranges::find(kPathTracers, type) == kPathTracers.end()) keepTransport(context_, node, parameters);
+    const LightTransport own =
+        makeFrom(context_, node, parameters, [&](const Parameters& p) { return readTransport(type, p); });
+    return nested.value_or(own);
+  }
+
+ private:
+  /// Reports a fault if the integrator has been read already: one that contains itself would be read without end, and
+  /// by references to others that are contained twice, a small file could contain any number of them.
+  bool isNew(pugi::xml_node node) {
+    if (!read_.contains(SceneFile::location(node))) return true;
+    context_.unsupported(node, fmt::format("circle at {}", SceneFile::location(node)),
+                         "an integrator that contains itself, or that is contained twice", "it is left out there");
+    return false;
+  }
+
+  ReadContext& context_;
+  std::set<std::ptrdiff_t> read_;  // by location
+  int depth_ = 0;                  // of the integrator being read
+};
 
 }  // namespace
 
@@ -357,7 +381,7 @@ void readSensor(ReadContext& context, pugi::xml_node node) {
 }
 
 void readIntegrator(ReadContext& context, pugi::xml_node node) {
-  const LightTransport transport = readTransportOf(context, node);
+  const LightTransport transport = TransportReader(context).read(node);
   Scene& scene = context.scene;
   scene.maxDepth = transport.maxDepth;
   if (transport.hideEmitters)

@@ -145,6 +145,35 @@ TEST_CASE("scenes: circular references are rejected") {
   CHECK(fault.starts_with("test.xml:2:1: a bsdf that refers to itself"));
 }
 
+TEST_CASE("scenes: integrators that contain themselves or are contained twice are rejected") {
+  const auto integrator = [](const std::string& id, const std::string& content) {
+    return "<integrator type=\"adaptive\" id=\"" + id + "\">" + content + "</integrator>\n";
+  };
+  const auto ref = [](const std::string& id) { return "<ref id=\"" + id + "\"/>"; };
+  const std::string fault = "an integrator that contains itself, or that is contained twice";
+  const std::string self = integrator("a", ref("a")), pair = integrator("a", ref("b")) + integrator("b", ref("a"));
+  for (const std::string& body : {self, pair}) {
+    CHECK(faultOf(body).starts_with("test.xml:2:1: " + fault));
+    const TestFolder folder;
+    const SceneCheck found = checkScene(folder.write("test.xml", sceneOf(body)));
+    CHECK(found.faults.size() == 1);
+    CHECK(!found.readable);
+  }
+  CHECK(faultOf(integrator("a", ref("b") + ref("b")) + integrator("b", "")).starts_with("test.xml:3:1: " + fault));
+
+  // Without the limit, the last one would be read 2^40 times.
+  std::string doubled;
+  for (int i = 0; i < 40; ++i)
+    doubled += integrator(std::to_string(i), ref(std::to_string(i + 1)) + ref(std::to_string(i + 1)));
+  doubled += "<integrator type=\"path\" id=\"40\"><integer name=\"max_depth\" value=\"7\"/></integrator>";
+  CHECK(readBody("<shape type=\"sphere\"/>\n" + doubled, lenient()).maxDepth == 7);
+  CHECK(readBody("<shape type=\"sphere\"/>\n" + self, lenient()).shapes.size() == 1);
+
+  std::string deep;
+  for (int i = 0; i < 100000; ++i) deep += integrator(std::to_string(i), ref(std::to_string(i + 1)));
+  CHECK_THAT(faultOf(deep + integrator("100000", "")), Catch::Contains("nested more than 100 deep"));
+}
+
 TEST_CASE("scenes: transforms are applied in the order given") {
   checkNear(moved("<translate x=\"10\"/><scale value=\"2\"/>"), {22, 4, 6});
   checkNear(moved("<scale value=\"2\"/><translate value=\"10, 0, 0\"/>"), {12, 4, 6});
