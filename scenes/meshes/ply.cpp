@@ -8,6 +8,7 @@
 #include <iterator>
 #include <map>
 #include <optional>
+#include <set>
 #include <span>
 #include <stdexcept>
 #include <string_view>
@@ -47,7 +48,8 @@ struct Element {
 struct Header {
   Format format;
   std::vector<Element> elements;
-  std::size_t size;  ///< in bytes, of the header itself
+  std::set<std::string> names;  ///< of the elements
+  std::size_t size;             ///< in bytes, of the header itself
 };
 
 // ---- Header
@@ -97,6 +99,9 @@ bool parseHeaderLine(std::string_view line, Header& header, bool& formatKnown) {
     header.format = parseFormat(words[1]);
     formatKnown = true;
   } else if (words[0] == "element" && words.size() == 3) {
+    // Two lists of vertices could have different properties, so that some vertices would have no normal.
+    if (!header.names.emplace(words[1]).second)
+      throw std::runtime_error(fmt::format("the header declares the element \"{}\" twice", words[1]));
     header.elements.push_back({std::string(words[1]), parseCount(words[2]), {}});
   } else if (words[0] == "property" && words.size() == 3 && !header.elements.empty()) {
     header.elements.back().properties.push_back({std::string(words[2]), parseType(words[1]), {}});

@@ -167,6 +167,24 @@ TEST_CASE("scenes: malformed PLY files are rejected with their name") {
   REQUIRE_THAT(faultOfReading([&] { readPly(folder / "none.ply", {}); }), Contains("none.ply: no such file"));
 }
 
+TEST_CASE("scenes: PLY files that declare an element twice are rejected") {
+  const Folder folder;
+  const auto fault = [&](const std::string& text) {
+    return faultOfReading([&] { readPly(folder.write("a.ply", "ply\nformat ascii 1.0\n" + text), {}); });
+  };
+  const std::string position = "property float x\nproperty float y\nproperty float z\n";
+  const std::string normal = "property float nx\nproperty float ny\nproperty float nz\n";
+  const std::string indices = "property list int int vertex_indices\n",
+                    texcoords = "property list int float texcoord\n";
+  // Without the check, there would be fewer normals than positions, and fewer texture coordinates than corners.
+  CHECK_THAT(fault("element vertex 3\n" + position + normal + "element vertex 3\n" + position + "element face 1\n" +
+                   indices + "end_header\n0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 0 0 0 1\n0 0 1\n1 0 1\n0 1 1\n3 3 4 5\n"),
+             Contains("a.ply: the header declares the element \"vertex\" twice"));
+  CHECK_THAT(fault("element vertex 3\n" + position + "element face 1\n" + indices + texcoords + "element face 1\n" +
+                   indices + "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 6 0 0 1 0 0 1\n3 0 1 2\n"),
+             Contains("a.ply: the header declares the element \"face\" twice"));
+}
+
 TEST_CASE("scenes: flipped bits in a PLY file never crash") {
   const Folder folder;
   const std::string bytes = binaryPly(false);
