@@ -82,7 +82,7 @@ Parameters readParameters(ReadContext& context, pugi::xml_node node, const std::
                           const ChildHandler& onChild) {
   Parameters parameters;
   const auto read = [&](pugi::xml_node child) {
-    if (SceneFile::hasUndefinedName(child)) return;
+    if (SceneFile::hasUndefinedName(child)) return parameters.markIncomplete();
     rejectText(context, child);
     if (std::optional<ParameterValue> value = readValue(context, child))
       return setValue(context, child, std::move(*value), parameters);

@@ -115,6 +115,7 @@ SceneFile::SceneFile(const std::filesystem::path& path, const std::map<std::stri
   {
     pugi::xml_document document;
     const std::size_t file = addFile(path, 0);
+    checkValues(definitions);
     const pugi::xml_node scene = parseAlone(file, document);
     expand(file, scene, {0, files_[file].text.size()}, expansion);
   }
@@ -127,6 +128,14 @@ SceneFile::SceneFile(const std::filesystem::path& path, const std::map<std::stri
   substitute(scene_);
   indexIds(scene_);
   indexAliases();
+}
+
+/// A $ in the value would be taken for a $name that is not defined.
+void SceneFile::checkValues(const std::map<std::string, std::string>& definitions) const {
+  for (const auto& [name, value] : definitions)
+    if (value.find('$') != std::string::npos)
+      fail(std::ptrdiff_t{0}, fmt::format("-D defines ${} as \"{}\": the value of a definition must not contain $",
+                                          shortened(name), shortened(value)));
 }
 
 void SceneFile::parse() {

@@ -32,7 +32,7 @@ class SceneFile {
   /// Reads and parses the file, replaces every <include> by the content of the <scene> in that file, and replaces every
   /// $name by its definition or, without one, by the first <default> of this name. Adds faults to findings, which must
   /// outlive this object: an undefined $name, a duplicate id, a file that cannot be included. Throws SceneError when
-  /// nothing can be read (no such file, malformed XML, elements nested too deeply).
+  /// nothing can be read (no such file, malformed XML, elements nested too deeply), or if a definition contains a $.
   SceneFile(const std::filesystem::path& path, const std::map<std::string, std::string>& definitions,
             Findings& findings);
 
@@ -88,6 +88,7 @@ class SceneFile {
   };
 
   void fault(std::ptrdiff_t location, const std::string& message, const std::string& consequence);
+  void checkValues(const std::map<std::string, std::string>& definitions) const;
   void parse();
   void checkDepth() const;
   void readDefaults(pugi::xml_node scene, std::ptrdiff_t start);

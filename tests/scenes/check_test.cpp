@@ -550,6 +550,7 @@ TEST_CASE("scenes: consequences of a fault are not reported as further faults") 
   CHECK(faults("<bsdf type=\"mask\"><ref id=\"nobody\"/></bsdf>").size() == 1);
   CHECK(faults("<bsdf type=\"diffuse\"><float name=\"reflectance\" value=\"$undefined\"/></bsdf>").size() == 1);
   CHECK(faults("<bsdf type=\"mask\"/>").size() == 1);
+  CHECK(faults("<shape type=\"ply\"><string name=\"filename\" value=\"$undefined\"/></shape>").size() == 1);
 }
 
 TEST_CASE("scenes: a fault is counted once although files are included after it") {

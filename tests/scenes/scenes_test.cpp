@@ -97,6 +97,25 @@ TEST_CASE("scenes: camera and luminaire of Mitsuba 0.4 are read as sensor and em
   CHECK((scene.shapes[0].emitter->radiance->mean() == 3.0f).all());
 }
 
+TEST_CASE("scenes: definitions on the command line must not contain names, unlike defaults in the file") {
+  const auto sphere = [](const std::string& defaults) {
+    return sceneOf(defaults + "<shape type=\"sphere\"><float name=\"radius\" value=\"$r\"/></shape>");
+  };
+  for (const std::string value : {"$x", "2$", "$r"}) {
+    ReadOptions options;
+    options.definitions = {{"r", value}};
+    const std::string expected =
+        "test.xml:1:1: -D defines $r as \"" + value + "\": the value of a definition must not contain $";
+    CHECK(faultOfText(sphere(""), options) == expected);
+    options.lenient = true;
+    CHECK(faultOfText(sphere(""), options) == expected);
+  }
+  ReadOptions options;
+  options.definitions = {{"x", "3"}};
+  const Scene scene = readText(sphere("<default name=\"r\" value=\"$x\"/>"), options);
+  CHECK(std::get<Sphere>(scene.shapes.at(0).geometry).radius == 3);
+}
+
 TEST_CASE("scenes: definitions on the command line override the defaults of the file") {
   const std::string text =
       "<scene><default name=\"w\" value=\"64\"/><default name=\"h\" value=\"32\"/><sensor type=\"perspective\">"
