@@ -22,9 +22,9 @@ std::string MeshBudget::fault() const {
       limit(), bytes_);
 }
 
-std::uintmax_t MeshBudget::limit() const {
+std::uintmax_t MeshBudget::limitFor(std::uintmax_t bytes, std::uintmax_t harmless) {
   constexpr std::uintmax_t kPerByte = 20;
-  return std::max(harmless_, kPerByte * bytes_);
+  return std::max(harmless, kPerByte * bytes);
 }
 
 }  // namespace lobe

@@ -17,6 +17,9 @@ class MeshBudget {
  public:
   static constexpr std::uintmax_t kHarmless = std::uintmax_t{1} << 26;
 
+  /// The number of triangles and vertices that is accepted for mesh files of that many bytes.
+  static std::uintmax_t limitFor(std::uintmax_t bytes, std::uintmax_t harmless = kHarmless);
+
   explicit MeshBudget(std::uintmax_t harmless = kHarmless) : harmless_(harmless) {}
 
   /// Counts a file that is going to be read, once; nothing if it does not exist. Not for several threads.
@@ -29,7 +32,7 @@ class MeshBudget {
   std::string fault() const;
 
  private:
-  std::uintmax_t limit() const;
+  std::uintmax_t limit() const { return limitFor(bytes_, harmless_); }
 
   std::uintmax_t harmless_;
   std::atomic<std::uintmax_t> size_ = 0;

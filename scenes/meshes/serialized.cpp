@@ -162,13 +162,28 @@ void skipName(Inflater& in) {
     if (length == kLongest) throw std::runtime_error(fmt::format("the mesh's name is longer than {} bytes", kLongest));
 }
 
-TriangleMesh unpack(Inflater& in, int version, bool& faceNormals) {
+/// What may follow the header of a mesh.
+struct Limits {
+  std::uintmax_t fileBytes, harmless;
+
+  /// Throws if a mesh of these numbers is refused. Its data can be a thousand times as large as the file.
+  void check(std::uint64_t vertices, std::uint64_t triangles) const {
+    if (vertices > std::numeric_limits<std::uint32_t>::max()) throw std::runtime_error("more than 2^32 vertices");
+    if (triangles > std::numeric_limits<std::uint32_t>::max()) throw std::runtime_error("more than 2^32 triangles");
+    const std::uintmax_t limit = MeshBudget::limitFor(fileBytes, harmless);
+    if (vertices + triangles > limit)
+      throw std::runtime_error(
+          fmt::format("the mesh has more than {} triangles and vertices together, the limit for a file of {} bytes",
+                      limit, fileBytes));
+  }
+};
+
+TriangleMesh unpack(Inflater& in, int version, const Limits& limits, bool& faceNormals) {
   const auto flags = in.value<std::uint32_t>();
   if (version == 4) skipName(in);
   const auto vertices = in.value<std::uint64_t>();
   const auto triangles = in.value<std::uint64_t>();
-  if (vertices > std::numeric_limits<std::uint32_t>::max()) throw std::runtime_error("more than 2^32 vertices");
-  if (triangles > std::numeric_limits<std::uint32_t>::max()) throw std::runtime_error("more than 2^32 triangles");
+  limits.check(vertices, triangles);
   faceNormals = faceNormals || (flags & kFaceNormals);
   TriangleMesh mesh;
   if (flags & kDoublePrecision)
@@ -179,7 +194,7 @@ TriangleMesh unpack(Inflater& in, int version, bool& faceNormals) {
   return mesh;
 }
 
-TriangleMesh readFrom(const std::filesystem::path& path, int index, MeshOptions options) {
+TriangleMesh readFrom(const std::filesystem::path& path, int index, MeshOptions options, std::uintmax_t harmless) {
   std::ifstream file = openFile(path);
   const std::uint64_t size = std::filesystem::file_size(path);
   if (size < 8) throw std::runtime_error("not a serialized mesh");
@@ -189,14 +204,15 @@ TriangleMesh readFrom(const std::filesystem::path& path, int index, MeshOptions 
   if (!file.read(packed.data(), static_cast<std::streamsize>(packed.size())))
     throw std::runtime_error("the file is truncated");
   Inflater in(std::move(packed));
-  TriangleMesh mesh = unpack(in, version, options.faceNormals);
+  TriangleMesh mesh = unpack(in, version, {size, harmless}, options.faceNormals);
   return toWorldMesh(std::move(mesh), options);
 }
 
 }  // namespace
 
-TriangleMesh readSerialized(const std::filesystem::path& path, int index, const MeshOptions& options) {
-  return nameErrors(path, [&] { return readFrom(path, index, options); });
+TriangleMesh readSerialized(const std::filesystem::path& path, int index, const MeshOptions& options,
+                            std::uintmax_t harmless) {
+  return nameErrors(path, [&] { return readFrom(path, index, options, harmless); });
 }
 
 }  // namespace lobe

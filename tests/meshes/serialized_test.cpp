@@ -5,6 +5,7 @@
 
 #include <sys/resource.h>
 
+#include <fmt/format.h>
 #include <zlib.h>
 #include <catch2/catch.hpp>
 
@@ -134,12 +135,14 @@ TEST_CASE("scenes: malformed serialized meshes are rejected") {
   bad.lastIndex = 3;
   CHECK_THROWS_WITH(read(fileOf({bad})), Contains("vertex 3 of 3"));
   bad = good;
-  bad.vertices = std::uint64_t{1} << 31;
+  bad.vertices = std::uint64_t{1} << 25;
   CHECK_THROWS_WITH(read(fileOf({bad})), Contains("damaged"));
+  bad.vertices = std::uint64_t{1} << 26;
+  CHECK_THROWS_WITH(read(fileOf({bad})), Contains("more than 67108864 triangles and vertices together"));
   bad.vertices = std::uint64_t{1} << 62;
   CHECK_THROWS_WITH(read(fileOf({bad})), Contains("2^32"));
   bad = good;
-  bad.triangles = std::uint64_t{1} << 31;
+  bad.triangles = std::uint64_t{1} << 25;
   CHECK_THROWS_WITH(read(fileOf({bad})), Contains("damaged"));
   bad.triangles = 0x5555555555555556;  // three times this is 2, because the product overflows
   CHECK_THROWS_WITH(read(fileOf({bad})), Contains("more than 2^32 triangles"));
@@ -186,6 +189,27 @@ TEST_CASE("scenes: a serialized mesh that claims more than it has takes no memor
   const long before = peakMemory();
   CHECK_THROWS_WITH(read(bytes), Contains("damaged or truncated"));
   CHECK(peakMemory() - before < 100000);  // of 600000
+}
+
+TEST_CASE("scenes: a serialized mesh that is too large for its file is refused before it is decompressed") {
+  Written bomb;
+  bomb.flags = 0x1000;
+  bomb.vertices = 500000;
+  bomb.triangles = 0;
+  bomb.rest.assign(12 * bomb.vertices, '\0');
+  const std::string bytes = fileOf({bomb});
+  const test::Folder folder;
+  const std::filesystem::path path = folder.write("a.serialized", bytes);
+  const std::uintmax_t limit = 20 * bytes.size();
+  REQUIRE(limit < bomb.vertices);
+  const std::string fault = fmt::format(
+      "a.serialized: the mesh has more than {} triangles and vertices together, the limit for a file of {} bytes",
+      limit, bytes.size());
+  CHECK_THROWS_WITH(readSerialized(path, 0, {}, 0), Contains(fault));
+  CHECK_THROWS_WITH(readSerialized(path, 0, {}), Contains("no triangles"));  // below the limit that does no harm
+
+  const std::filesystem::path small = folder.write("small.serialized", fileOf({Written{}}));
+  CHECK(readSerialized(small, 0, {}, 0).positions.size() == 3);
 }
 
 TEST_CASE("scenes: serialized meshes with any wrong or missing byte never crash") {
