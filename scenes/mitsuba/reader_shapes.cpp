@@ -247,7 +247,7 @@ ShapeReader::Mesh ShapeReader::makeMesh(const std::string& type, const Parameter
     source.obj = {{}, readIndex(parameters, -1), readGrouping(parameters, isOfToday)};
     loadMaterials = parameters.flag("load_materials", !isOfToday);
   }
-  return {{}, parameters.location("filename"), std::move(source), options, loadMaterials, ""};
+  return {{}, parameters.location("filename"), std::move(source), options, loadMaterials, false, ""};
 }
 
 void ShapeReader::addMesh(int group, pugi::xml_node node, Mesh mesh, const std::string& name, const Parts& parts) {
@@ -265,7 +265,8 @@ void ShapeReader::addMesh(int group, pugi::xml_node node, Mesh mesh, const std::
       mesh.source.obj.materials.push_back(material);
       add(fmt::format("{}:{}", name, material), index);
     }
-  add(name, materialOf(parts));
+  mesh.isNamed = context_.file.isOfToday() && parts.named.size() == 1 && !parts.bsdf && !mesh.loadMaterials;
+  add(name, mesh.isNamed ? shapes.back().material : materialOf(parts));
   meshes_.push_back(std::move(mesh));
 }
 
@@ -291,6 +292,7 @@ void ShapeReader::readMeshes() {
   if (budget_.isExceeded()) leaveOutMeshes();
   for (const Mesh& mesh : meshes_) reportFault(mesh);
   clearInstancesOutOfRange();
+  for (const Mesh& mesh : meshes_) limitToMaterial(mesh);
   for (const Mesh& mesh : meshes_) noteUnusedMaterials(mesh);
   dropEmpty();
   for (Shape& shape : context_.scene.shapes)
@@ -370,8 +372,18 @@ void ShapeReader::leaveOutFlatInstances() {
   dropEmpty();
 }
 
+/// Mitsuba 2 and 3 ignore the names of BSDFs, so that the only BSDF is that of all faces. A name that is that of a
+/// material of the OBJ is taken as in Mitsuba 0.6, where the other faces have the default BSDF.
+void ShapeReader::limitToMaterial(const Mesh& mesh) {
+  if (!mesh.isNamed) return;
+  const auto shapeAt = [this](const Place& place) -> Shape& { return shapesOf(place.group)[place.index]; };
+  Shape& others = shapeAt(mesh.shapes[1]);
+  if (!isEmptyMesh(shapeAt(mesh.shapes[0])) && !isEmptyMesh(others))
+    others.material = materials_.useDefault(others.emitter.has_value());
+}
+
 void ShapeReader::noteUnusedMaterials(const Mesh& mesh) {
-  if (!mesh.fault.empty()) return;
+  if (!mesh.fault.empty() || mesh.isNamed) return;
   for (std::size_t i = 0; i < mesh.source.obj.materials.size(); ++i)
     if (isEmptyMesh(shapesOf(mesh.shapes[i].group)[mesh.shapes[i].index]))
       context_.note(fmt::format("{}: no face has the material \"{}\"", mesh.source.path.filename().string(),

@@ -48,6 +48,7 @@ class ShapeReader {
     MeshSource source;
     MeshOptions options;
     bool loadMaterials;  ///< from the library that the OBJ names
+    bool isNamed;        ///< the only BSDF has a name, which need not be that of a material of the OBJ
     std::string fault;
   };
 
@@ -73,6 +74,7 @@ class ShapeReader {
   /// Reports a fault for each instance whose group is too far away, and clears the instance.
   void clearInstancesOutOfRange();
   void dropDuplicates(Shape& shape);
+  void limitToMaterial(const Mesh& mesh);
   void noteUnusedMaterials(const Mesh& mesh);
   /// Removes shapes without a triangle, so that the indices of others are not valid any more.
   void dropEmpty();

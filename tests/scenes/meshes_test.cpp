@@ -125,6 +125,32 @@ TEST_CASE("scenes: the library of an OBJ is ignored where the scene gives materi
   CHECK(files.read("<boolean name=\"load_materials\" value=\"true\"/>", "3.0.0").shapes.size() == 3);
 }
 
+TEST_CASE("scenes: the only BSDF of an OBJ is that of all faces in new files, unless its name is that of a material") {
+  const ObjScene files(kRedAndGreen);
+  const auto bsdf = [](const std::string& name) {
+    return "<bsdf name=\"" + name + "\" type=\"diffuse\"><rgb name=\"reflectance\" value=\"0.3\"/></bsdf>";
+  };
+  for (const std::string version : {"2.0.0", "3.0.0"}) {
+    const Scene whole = files.read(bsdf("material"), version);
+    REQUIRE(whole.shapes.size() == 1);
+    CHECK(whole.materials.size() == 1);
+    CHECK(isNear(albedoOf(whole, 0), grey(0.3f)));
+    CHECK(std::get<TriangleMesh>(whole.shapes[0].geometry).triangles.size() == 5);
+    CHECK(whole.notes.empty());
+    const Scene part = files.read(bsdf("green"), version);
+    REQUIRE(part.shapes.size() == 2);
+    CHECK(isNear(albedoOf(part, 0), grey(0.3f)));
+    CHECK(isNear(albedoOf(part, 1), grey(0.5f)));
+    const Scene several = files.read(bsdf("green") + bsdf("material"), version);
+    REQUIRE(several.shapes.size() == 2);
+    CHECK(isNear(albedoOf(several, 1), grey(0.5f)));
+    CHECK(several.notes.size() == 1);
+  }
+  const Scene old = files.read(bsdf("material") + "<boolean name=\"loadMaterials\" value=\"false\"/>");
+  REQUIRE(old.shapes.size() == 1);
+  CHECK(isNear(albedoOf(old, 0), grey(0.5f)));
+}
+
 TEST_CASE("scenes: the last material of a name in a library is used") {
   const Scene scene = ObjScene(kRedAndGreen + "newmtl red\nKd 0 0 1\n").read();
   CHECK(isNear(albedoOf(scene, 0), Rgb(0, 0, 1)));
