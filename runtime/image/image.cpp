@@ -1,9 +1,11 @@
 #include "runtime/image/image.h"
 
 #include <ImfChannelList.h>
+#include <ImfChromaticities.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
+#include <ImfStandardAttributes.h>
 #include <ImfTestFile.h>
 #include <ImfVersion.h>
 
@@ -22,6 +24,7 @@
 #include <variant>
 
 #include <fmt/format.h>
+#include <Eigen/LU>
 
 #include "runtime/core/colour.h"
 #include "runtime/core/files.h"
@@ -135,19 +138,58 @@ Image readDisplayWindow(const std::filesystem::path& path, Imf::InputFile& file,
   return image;
 }
 
+/// From linear RGB with these primaries to CIE XYZ; their white has a luminance of 1.
+Eigen::Matrix3d xyzOfRgb(const Imf::Chromaticities& chromaticities) {
+  const auto xyz = [](const Imath::V2f& p) { return Eigen::Vector3d(p.x, p.y, 1.0 - p.x - p.y); };
+  Eigen::Matrix3d primaries;
+  primaries << xyz(chromaticities.red), xyz(chromaticities.green), xyz(chromaticities.blue);
+  const Eigen::Vector3d white = xyz(chromaticities.white) / chromaticities.white.y;
+  return primaries * Eigen::Vector3d(primaries.inverse() * white).asDiagonal();
+}
+
+/// With Mitsuba's tolerance.
+bool isEqual(const Imf::Chromaticities& a, const Imf::Chromaticities& b) {
+  return (a.red - b.red).length2() + (a.green - b.green).length2() + (a.blue - b.blue).length2() +
+             (a.white - b.white).length2() <
+         1e-6f;
+}
+
+/// Converts colours to Rec. 709 if the file says that they have other primaries, without adaptation of the white, as
+/// in Mitsuba. Negative components of colours that had none, which are outside the gamut, become zero.
+void convertToRec709(const std::filesystem::path& path, const Imf::Header& header, Image& image) {
+  if (!Imf::hasChromaticities(header)) return;
+  const Imf::Chromaticities rec709, given = Imf::chromaticities(header);
+  if (isEqual(given, rec709)) return;
+  const Eigen::Matrix3f matrix = (xyzOfRgb(rec709).inverse() * xyzOfRgb(given)).cast<float>();
+  // Far above those of all colour spaces, but exceeded if the primaries are on a line.
+  constexpr float kLargest = 1e4f;
+  if (!(matrix.array().abs() <= kLargest).all()) fail(path, "its chromaticities are not those of a colour space");
+  for (Rgb& pixel : image.pixels) {
+    const bool clamps = pixel.allFinite() && (pixel >= 0.0f).all();
+    pixel = (matrix * pixel.matrix()).array().eval();
+    if (clamps) pixel = pixel.max(0.0f).eval();
+  }
+}
+
+/// How the channels of a file are used: data are not converted.
+enum class Use { colours, data };
+
 /// namesOf: given the list of channels, which to read; nullopt: none, and there is no image.
 template <class NamesOf>
-std::optional<Image> readExrPixels(const std::filesystem::path& path, const NamesOf& namesOf) {
+std::optional<Image> readExrPixels(const std::filesystem::path& path, Use use, const NamesOf& namesOf) {
   const std::unique_ptr<Imf::InputFile> opened = openExr(path);
   Imf::InputFile& file = *opened;
   const std::optional<ChannelNames> names = namesOf(file.header().channels());
   if (!names) return std::nullopt;
-  return readDisplayWindow(path, file, *names);
+  Image image = readDisplayWindow(path, file, *names);
+  const bool isGrey = (*names)[1] == (*names)[0];
+  if (use == Use::colours && !isGrey) convertToRec709(path, file.header(), image);
+  return image;
 }
 
 template <class NamesOf>
-std::optional<Image> readExr(const std::filesystem::path& path, const NamesOf& namesOf) {
-  return nameExrErrors(path, [&] { return readExrPixels(path, namesOf); });
+std::optional<Image> readExr(const std::filesystem::path& path, Use use, const NamesOf& namesOf) {
+  return nameExrErrors(path, [&] { return readExrPixels(path, use, namesOf); });
 }
 
 // ---- Other formats
@@ -285,7 +327,7 @@ Image readPart(const std::filesystem::path& path, const Encoding& encoding, Part
   if (status.type() == std::filesystem::file_type::none) fail(path, error.message());
   if (!is_regular_file(status)) fail(path, "not a file");
   if (!isExrFile(path)) return readOther(path, encoding, part);
-  return *readExr(path,
+  return *readExr(path, Use::colours,
                   [&](const Imf::ChannelList& channels) { return std::optional(exrChannels(path, channels, part)); });
 }
 
@@ -316,7 +358,7 @@ Image readAlpha(const std::filesystem::path& path) {
 
 std::optional<Image> readChannels(const std::filesystem::path& path, const std::array<std::string, 3>& names) {
   if (!isExrFile(path)) return std::nullopt;
-  return readExr(path, [&](const Imf::ChannelList& channels) {
+  return readExr(path, Use::data, [&](const Imf::ChannelList& channels) {
     const bool complete =
         std::ranges::all_of(names, [&](const std::string& name) { return channels.findChannel(name); });
     return complete ? std::optional(names) : std::nullopt;

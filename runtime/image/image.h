@@ -41,7 +41,8 @@ struct Encoding {
 bool isExrFile(const std::filesystem::path& path);
 
 /// Reads PNG (png_file.h), JPEG (jpeg_file.h), BMP, TGA (stb_image), HDR (rgbe_file.h) and EXR (OpenEXR; R, G, B or a
-/// single luminance channel Y). The image of an EXR file is the display window, black outside the data window.
+/// single luminance channel Y). The image of an EXR file is the display window, black outside the data window; its
+/// colours are converted to Rec. 709 if it has other chromaticities, and components that this makes negative are zero.
 /// Floating-point data are linear whatever the encoding. Alpha is discarded. Throws std::runtime_error that names the
 /// file and the fault.
 Image readImage(const std::filesystem::path& path, Encoding encoding = {});
@@ -50,8 +51,8 @@ Image readImage(const std::filesystem::path& path, Encoding encoding = {});
 /// like readImage, and if there is no alpha channel.
 Image readAlpha(const std::filesystem::path& path);
 
-/// Three channels of an .exr file, or one given three times. nullopt: the file lacks one of them, or is not an .exr
-/// file. Throws std::runtime_error like readImage.
+/// Three channels of an .exr file, or one given three times, as they are stored. nullopt: the file lacks one of them,
+/// or is not an .exr file. Throws std::runtime_error like readImage.
 std::optional<Image> readChannels(const std::filesystem::path& path, const std::array<std::string, 3>& names);
 
 }  // namespace lobe

@@ -5,10 +5,12 @@
 #include <cstring>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <ImfChannelList.h>
+#include <ImfChromaticities.h>
 #include <ImfDeepScanLineOutputFile.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
@@ -16,6 +18,7 @@
 #include <ImfOutputFile.h>
 #include <ImfPartType.h>
 #include <ImfPreviewImageAttribute.h>
+#include <ImfStandardAttributes.h>
 #include <ImfTileDescription.h>
 #include <ImfTiledOutputFile.h>
 #include <catch2/catch.hpp>
@@ -60,6 +63,23 @@ void writeExr(const std::filesystem::path& path, const std::vector<std::string>&
   Imf::OutputFile file(path.c_str(), header);
   file.setFrameBuffer(frame);
   file.writePixels(height);
+}
+
+/// An image of one row.
+void writeColours(const std::filesystem::path& path, const std::optional<Imf::Chromaticities>& chromaticities,
+                  std::vector<std::array<float, 3>> row) {
+  const auto width = static_cast<int>(row.size());
+  Imf::Header header(width, 1);
+  if (chromaticities) Imf::addChromaticities(header, *chromaticities);
+  Imf::FrameBuffer frame;
+  constexpr std::array kNames = {"R", "G", "B"};
+  for (std::size_t c = 0; c < kNames.size(); ++c) {
+    header.channels().insert(kNames[c], Imf::Channel(Imf::FLOAT));
+    frame.insert(kNames[c], Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(&row[0][c]), sizeof(row[0]), 0));
+  }
+  Imf::OutputFile file(path.c_str(), header);
+  file.setFrameBuffer(frame);
+  file.writePixels(1);
 }
 
 Box2i box(int left, int top, int right, int bottom) {
@@ -129,6 +149,58 @@ TEST_CASE("materials: EXR images of half and float with colour and luminance") {
   writeExr(path, {"Z", "N.X"}, Imf::FLOAT, box(0, 0, 4, 2), box(0, 0, 4, 2));
   const std::string fault = faultOfReading([&] { readImage(path); });
   REQUIRE_THAT(fault, Contains("a.exr") && Contains("N.X Z"));
+}
+
+TEST_CASE("materials: colours of EXR images are converted from the primaries of the file to Rec. 709") {
+  const Folder folder;
+  const std::filesystem::path path = folder / "a.exr";
+  const auto readRow = [&](const std::optional<Imf::Chromaticities>& chromaticities,
+                           const std::vector<std::array<float, 3>>& colours) {
+    writeColours(path, chromaticities, colours);
+    return readImage(path).pixels;
+  };
+  using Imath::V2f;
+  const V2f d65(0.3127f, 0.3290f);
+  const Imf::Chromaticities rec2020(V2f(0.708f, 0.292f), V2f(0.170f, 0.797f), V2f(0.131f, 0.046f), d65);
+  const std::vector<std::array<float, 3>> row = {
+      {1, 1, 1}, {0.5f, 0.25f, 0.125f}, {0, 1, 0}, {0, 1, -0.5f}, {1e20f, 1e20f, 1e20f}};
+
+  // The matrix of Rec. ITU-R BT.2087.
+  Eigen::Matrix3f from2020;
+  from2020 << 1.6605f, -0.5876f, -0.0728f, -0.1246f, 1.1329f, -0.0083f, -0.0182f, -0.1006f, 1.1187f;
+  const std::vector<Rgb> converted = readRow(rec2020, row);
+  requireNear(converted[0], grey(1), 2e-4f);
+  requireNear(converted[1], Rgb((from2020 * Vec3(0.5f, 0.25f, 0.125f)).array()), 2e-4f);
+  // Outside the gamut, but no fault: the others are negative. A colour that was negative before remains so.
+  requireNear(converted[2], Rgb(0, 1.1329f, 0), 2e-4f);
+  requireNear(converted[3], Rgb((from2020 * Vec3(0, 1, -0.5f)).array()), 2e-4f);
+  CHECK(converted[3].minCoeff() < -0.5f);
+  requireNear(Rgb(converted[4] * 1e-20f), grey(1), 2e-4f);
+
+  // The white of ACES is not adapted: its matrix to XYZ in SMPTE ST 2065-1, then that of IEC 61966-2-1.
+  const Imf::Chromaticities aces(V2f(0.7347f, 0.2653f), V2f(0, 1), V2f(0.0001f, -0.077f), V2f(0.32168f, 0.33767f));
+  Eigen::Matrix3f acesToXyz, xyzTo709;
+  acesToXyz << 0.9525523959f, 0, 0.0000936786f, 0.3439664498f, 0.7281660966f, -0.0721325464f, 0, 0, 1.0088251844f;
+  xyzTo709 << 3.2406f, -1.5372f, -0.4986f, -0.9689f, 1.8758f, 0.0415f, 0.0557f, -0.2040f, 1.0570f;
+  requireNear(readRow(aces, row)[1], Rgb((xyzTo709 * acesToXyz * Vec3(0.5f, 0.25f, 0.125f)).array()), 1e-3f);
+
+  const Imf::Chromaticities xyz(V2f(1, 0), V2f(0, 1), V2f(0, 0), V2f(1 / 3.0f, 1 / 3.0f));
+  requireNear(readRow(xyz, {std::array{0.3f, 0.4f, 0.5f}})[0], Rgb((xyzTo709 * Vec3(0.3f, 0.4f, 0.5f)).array()), 1e-3f);
+
+  // Without chromaticities, or with those of Rec. 709, no bit changes.
+  for (const std::optional<Imf::Chromaticities>& same :
+       {std::optional<Imf::Chromaticities>(), std::optional(Imf::Chromaticities())}) {
+    const std::vector<Rgb> unchanged = readRow(same, row);
+    for (std::size_t i = 0; i < row.size(); ++i) CHECK((unchanged[i] == Rgb(row[i][0], row[i][1], row[i][2])).all());
+  }
+  // Nor does it where channels are read as data.
+  writeColours(path, rec2020, row);
+  CHECK((readChannels(path, {"R", "G", "B"}).value().pixels[1] == Rgb(0.5f, 0.25f, 0.125f)).all());
+  CHECK((readChannels(path, {"G", "G", "G"}).value().pixels[1] == 0.25f).all());
+
+  const Imf::Chromaticities flat(V2f(0.3f, 0.3f), V2f(0.4f, 0.4f), V2f(0.5f, 0.5f), d65);
+  writeColours(path, flat, row);
+  CHECK_THAT(faultOfReading([&] { readImage(path); }), Contains("a.exr: its chromaticities are not those of a colour"));
 }
 
 TEST_CASE("materials: an EXR image has the size of its display window") {
