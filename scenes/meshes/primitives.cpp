@@ -83,7 +83,7 @@ Disk makeDisk(const MeshOptions& options) {
   return {centre, u, v, mirrors(linear) != options.flipNormals};
 }
 
-Sphere makeSphere(const Vec3& centre, float radius, const MeshOptions& options) {
+Sphere makeSphere(const Vec3& centre, float radius, const MeshOptions& options, SphereTransform kind) {
   if (!(radius > 0) || !std::isfinite(radius) || !centre.allFinite())
     throw std::runtime_error("a sphere needs a finite centre and a radius above zero");
   const Eigen::Matrix3f linear = checkedLinear(options.toWorld);
@@ -92,9 +92,10 @@ Sphere makeSphere(const Vec3& centre, float radius, const MeshOptions& options) 
   if (!((squares - square * Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <= 2 * kTolerance * square))
     throw std::runtime_error("a sphere's transform must scale uniformly: ellipsoids are not supported");
   const auto scale = static_cast<float>(std::sqrt(square));
-  const Vec3 placed = linear * centre + options.toWorld.topRightCorner<3, 1>();
+  const Eigen::Matrix3f axes = linear / scale;
+  const Vec3 placed = (kind == SphereTransform::old ? axes : linear) * centre + options.toWorld.topRightCorner<3, 1>();
   requireInRange(placed, Vec3::Constant(radius * scale));
-  return {placed, radius * scale, options.flipNormals, linear / scale};
+  return {placed, radius * scale, options.flipNormals, axes};
 }
 
 Cylinder makeCylinder(const Vec3& start, const Vec3& end, float radius, const MeshOptions& options) {

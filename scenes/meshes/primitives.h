@@ -16,8 +16,13 @@ TriangleMesh makeCube(const MeshOptions& options);
 /// The unit disk in the plane z = 0, front towards +z; a general transform makes it an ellipse.
 Disk makeDisk(const MeshOptions& options);
 
+/// How the transform of a sphere is applied. old, as in Mitsuba 0.6: its scale applies to the radius alone, so that the
+/// centre is only rotated and moved. today, as in Mitsuba 3 and the last releases of Mitsuba 2: to the centre, too.
+enum class SphereTransform { old, today };
+
 /// radius > 0. Throws std::runtime_error when the transform would make it an ellipsoid.
-Sphere makeSphere(const Vec3& centre, float radius, const MeshOptions& options);
+Sphere makeSphere(const Vec3& centre, float radius, const MeshOptions& options,
+                  SphereTransform kind = SphereTransform::today);
 
 /// The lateral surface of a cylinder about the segment from start to end; radius > 0. As in Mitsuba, its texture starts
 /// at an arbitrary azimuth. Throws std::runtime_error when the transform does not keep it a right circular cylinder.

@@ -57,8 +57,8 @@ float readRadius(const Parameters& parameters) {
   return static_cast<float>(radius);
 }
 
-Sphere makeSphereFrom(const Parameters& parameters, const MeshOptions& options) {
-  return makeSphere(parameters.colour("center", Rgb::Zero()).matrix(), readRadius(parameters), options);
+Sphere makeSphereFrom(const Parameters& parameters, const MeshOptions& options, SphereTransform kind) {
+  return makeSphere(parameters.colour("center", Rgb::Zero()).matrix(), readRadius(parameters), options, kind);
 }
 
 Cylinder makeCylinderFrom(const Parameters& parameters, const MeshOptions& options) {
@@ -68,13 +68,14 @@ Cylinder makeCylinderFrom(const Parameters& parameters, const MeshOptions& optio
   return makeCylinder(start, end, readRadius(parameters), options);
 }
 
-Geometry makePrimitive(const std::string& type, const Parameters& parameters, const MeshOptions& options) {
+Geometry makePrimitive(const std::string& type, const Parameters& parameters, const MeshOptions& options,
+                       bool isOfToday) {
   try {
     if (type == "rectangle") return makeRectangle(options);
     if (type == "cube") return makeCube(options);
     if (type == "disk") return makeDisk(options);
     if (type == "cylinder") return makeCylinderFrom(parameters, options);
-    return makeSphereFrom(parameters, options);
+    return makeSphereFrom(parameters, options, isOfToday ? SphereTransform::today : SphereTransform::old);
   } catch (const ParameterError&) {
     throw;
   } catch (const std::runtime_error& error) {
@@ -146,8 +147,9 @@ void ShapeReader::addShape(int group, pugi::xml_node node, const std::string& ty
     addMesh(group, node, std::move(mesh), id.empty() ? file : id, parts);
     return;
   }
-  Geometry geometry = makeFrom(context_, node, parameters,
-                               [&](const Parameters& p) { return makePrimitive(type, p, readOptions(type, p)); });
+  Geometry geometry = makeFrom(context_, node, parameters, [&](const Parameters& p) {
+    return makePrimitive(type, p, readOptions(type, p), context_.file.isOfToday());
+  });
   shapesOf(group).push_back({id.empty() ? type : id, std::move(geometry), materialOf(parts), parts.emitter});
 }
 

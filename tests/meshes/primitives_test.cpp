@@ -94,6 +94,9 @@ TEST_CASE("scenes: makeSphere creates a transformed sphere") {
   REQUIRE(sphere.radius == Approx(1.5f));
   REQUIRE_FALSE(sphere.flipped);
   requireNear(sphere.axes.col(1), Vec3(0, -1, 0));
+  const Sphere old = makeSphere({0, 1, 0}, 0.5f, placed(transform), SphereTransform::old);
+  requireNear(old.centre, Vec3(1, 1, 3));
+  REQUIRE(old.radius == Approx(1.5f));
   REQUIRE((sphere.axes.transpose() * sphere.axes).isIdentity(1e-5f));
   MeshOptions flipped;
   flipped.flipNormals = true;

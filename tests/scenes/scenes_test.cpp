@@ -206,6 +206,24 @@ TEST_CASE("scenes: transforms are applied in the order given") {
   checkNear(moved("<lookAt origin=\"0 0 5\" target=\"0 0 0\" up=\"0 1 0\"/>"), {-1, 2, 2});
 }
 
+TEST_CASE("scenes: the centre of a sphere is scaled by its transform in new files only") {
+  const auto centreIn = [](const std::string& version) {
+    const Scene scene = readText(
+        "<scene version=\"" + version +
+        "\"><shape type=\"sphere\"><point name=\"center\" x=\"1\" y=\"2\" z=\"3\"/><float name=\"radius\" value=\"2\"/>"
+        "<transform name=\"toWorld\"><scale value=\"2\"/><rotate z=\"1\" angle=\"90\"/><translate "
+        "x=\"10\"/></transform>"
+        "</shape>" +
+        kSensor + "</scene>");
+    const auto& sphere = std::get<Sphere>(scene.shapes.at(0).geometry);
+    CHECK(sphere.radius == Approx(4));
+    return sphere.centre;
+  };
+  checkNear(centreIn("0.6.0"), {8, 1, 3});
+  checkNear(centreIn("2.2.0"), {6, 2, 6});
+  checkNear(centreIn("3.0.0"), {6, 2, 6});
+}
+
 TEST_CASE("scenes: shapes are placed by their transform") {
   const Scene scene = readBody(
       "<shape type=\"rectangle\"><transform name=\"toWorld\"><translate z=\"4\"/></transform></shape>"
