@@ -95,7 +95,8 @@ Sphere makeSphere(const Vec3& centre, float radius, const MeshOptions& options, 
   const Eigen::Matrix3f axes = linear / scale;
   const Vec3 placed = (kind == SphereTransform::old ? axes : linear) * centre + options.toWorld.topRightCorner<3, 1>();
   requireInRange(placed, Vec3::Constant(radius * scale));
-  return {placed, radius * scale, options.flipNormals, axes};
+  const bool turned = kind == SphereTransform::today && mirrors(linear);
+  return {placed, radius * scale, options.flipNormals != turned, axes};
 }
 
 Cylinder makeCylinder(const Vec3& start, const Vec3& end, float radius, const MeshOptions& options) {

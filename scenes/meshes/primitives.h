@@ -1,6 +1,6 @@
 #pragma once
-// Mitsuba's simple shapes. Under a mirroring transform, the front stays on the side of the transformed normal. Each
-// function throws std::runtime_error when the transform is singular, not finite or not affine.
+// Mitsuba's simple shapes. Under a mirroring transform, the front stays on the side of the transformed normal, unless
+// stated otherwise. Each function throws std::runtime_error when the transform is singular, not finite or not affine.
 
 #include "scenes/meshes/mesh_options.h"
 #include "scenes/scene.h"
@@ -17,7 +17,8 @@ TriangleMesh makeCube(const MeshOptions& options);
 Disk makeDisk(const MeshOptions& options);
 
 /// How the transform of a sphere is applied. old, as in Mitsuba 0.6: its scale applies to the radius alone, so that the
-/// centre is only rotated and moved. today, as in Mitsuba 3 and the last releases of Mitsuba 2: to the centre, too.
+/// centre is only rotated and moved. today, as in Mitsuba 3 and the last releases of Mitsuba 2: the scale applies to
+/// the centre, too, and a mirroring transform turns the front inwards.
 enum class SphereTransform { old, today };
 
 /// radius > 0. Throws std::runtime_error when the transform would make it an ellipsoid.

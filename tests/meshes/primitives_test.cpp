@@ -92,7 +92,6 @@ TEST_CASE("scenes: makeSphere creates a transformed sphere") {
   const Sphere sphere = makeSphere({0, 1, 0}, 0.5f, placed(transform));
   requireNear(sphere.centre, Vec3(1, -1, 3));
   REQUIRE(sphere.radius == Approx(1.5f));
-  REQUIRE_FALSE(sphere.flipped);
   requireNear(sphere.axes.col(1), Vec3(0, -1, 0));
   const Sphere old = makeSphere({0, 1, 0}, 0.5f, placed(transform), SphereTransform::old);
   requireNear(old.centre, Vec3(1, 1, 3));
@@ -101,6 +100,14 @@ TEST_CASE("scenes: makeSphere creates a transformed sphere") {
   MeshOptions flipped;
   flipped.flipNormals = true;
   REQUIRE(makeSphere(Vec3::Zero(), 1, flipped).flipped);
+  // A mirroring transform turns the front inwards, but not in old files.
+  REQUIRE(sphere.flipped);
+  REQUIRE_FALSE(old.flipped);
+  REQUIRE_FALSE(makeSphere(Vec3::Zero(), 1, {}).flipped);
+  MeshOptions both = placed(mirror());
+  both.flipNormals = true;
+  REQUIRE_FALSE(makeSphere(Vec3::Zero(), 1, both).flipped);
+  REQUIRE(makeSphere(Vec3::Zero(), 1, both, SphereTransform::old).flipped);
   REQUIRE_THROWS_AS(makeSphere(Vec3::Zero(), 0, {}), std::runtime_error);
   REQUIRE_THROWS_AS(makeSphere(Vec3::Zero(), 1, placed(Eigen::Affine3f(Eigen::Scaling(1.0f, 1.0f, 1.01f)))),
                     std::runtime_error);
@@ -115,6 +122,7 @@ TEST_CASE("scenes: makeCylinder creates a transformed cylinder") {
   REQUIRE(cylinder.u.norm() == Approx(1));
   REQUIRE(cylinder.v.norm() == Approx(1));
   REQUIRE(cylinder.u.dot(cylinder.v) == Approx(0).margin(1e-6));
+  REQUIRE_FALSE(makeCylinder({0, 0, 0}, {0, 0, 1}, 1, placed(mirror())).flipped);
   const auto scaled = [](float x, float y, float z) { return placed(Eigen::Affine3f(Eigen::Scaling(x, y, z))); };
   REQUIRE_THROWS_WITH(makeCylinder({0, 0, 0}, {0, 0, 1}, 1, scaled(1, 2, 1)), Contains("circular"));
   REQUIRE_THROWS_WITH(makeCylinder({0, 0, 0}, {1, 0, 1}, 1, scaled(1, 1, 2)), Contains("circular"));

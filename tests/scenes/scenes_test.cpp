@@ -224,6 +224,18 @@ TEST_CASE("scenes: the centre of a sphere is scaled by its transform in new file
   checkNear(centreIn("3.0.0"), {6, 2, 6});
 }
 
+TEST_CASE("scenes: a mirroring transform turns the front of a sphere inwards in new files only") {
+  const auto flippedIn = [](const std::string& version) {
+    const Scene scene = readText("<scene version=\"" + version +
+                                 "\"><shape type=\"sphere\"><transform name=\"toWorld\"><scale x=\"-1\"/></transform>"
+                                 "</shape>" +
+                                 kSensor + "</scene>");
+    return std::get<Sphere>(scene.shapes.at(0).geometry).flipped;
+  };
+  CHECK(!flippedIn("0.6.0"));
+  CHECK(flippedIn("3.0.0"));
+}
+
 TEST_CASE("scenes: shapes are placed by their transform") {
   const Scene scene = readBody(
       "<shape type=\"rectangle\"><transform name=\"toWorld\"><translate z=\"4\"/></transform></shape>"
