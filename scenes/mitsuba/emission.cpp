@@ -3,26 +3,24 @@
 #include <fmt/format.h>
 
 namespace lobe {
-namespace {
 
-void check(const char* name, const Rgb& colour) {
+void checkEmission(const char* name, std::string_view what, const Rgb& colour) {
   // Negated, so that it also rejects NaN.
   if (!((colour >= 0.0f).all() && (colour <= kLargestEmission).all()))
-    throw ParameterError(name, fmt::format("{} must be neither negative nor over {:g}, but is {} {} {}", name,
+    throw ParameterError(name, fmt::format("{} must be neither negative nor over {:g}, but is {} {} {}", what,
                                            kLargestEmission, colour.x(), colour.y(), colour.z()));
 }
 
-}  // namespace
-
 Rgb emission(const Parameters& parameters, const char* name, const Rgb& fallback) {
   const Rgb colour = parameters.colour(name, fallback);
-  check(name, colour);
+  checkEmission(name, name, colour);
   return colour;
 }
 
 TexturePtr emissionTexture(const Parameters& parameters, const char* name, const Rgb& fallback) {
   TexturePtr texture = parameters.texture(name, fallback);
-  check(name, texture->mean());
+  checkEmission(name, name, texture->mean());
+  checkEmission(name, fmt::format("the largest {}", name), texture->largest());
   return texture;
 }
 

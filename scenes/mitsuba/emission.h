@@ -1,6 +1,8 @@
 #pragma once
 // Reads parameters of emitted radiance, intensity and irradiance.
 
+#include <string_view>
+
 #include "materials/parameters.h"
 #include "scenes/mitsuba/read_context.h"
 
@@ -9,8 +11,12 @@ namespace lobe {
 /// Largest allowed emission: more would overflow when summed over areas, directions and samples.
 inline constexpr float kLargestEmission = 1e30f;
 
-/// The value of an emission parameter. These functions throw ParameterError when the emission is negative, too large
-/// (for a texture: on average) or not a number.
+/// Throws ParameterError with this name unless the colour, which can be a product of parameters, is an emission:
+/// neither negative nor too large nor without a number. what: begins the message.
+void checkEmission(const char* name, std::string_view what, const Rgb& colour);
+
+/// The value of an emission parameter. These functions throw ParameterError when the emission is negative (for a
+/// texture: on average), too large (for a texture: anywhere) or not a number.
 Rgb emission(const Parameters& parameters, const char* name, const Rgb& fallback);
 TexturePtr emissionTexture(const Parameters& parameters, const char* name, const Rgb& fallback);
 double emissionScale(const Parameters& parameters, const char* name, double fallback);

@@ -116,6 +116,10 @@ bool DaylightReader::read(pugi::xml_node node, const Parameters& parameters, con
   const double skyScale = type == "sunsky" ? emissionScale(parameters, "sky_scale", scale) : scale;
   const double sunScale = type == "sunsky" ? emissionScale(parameters, "sun_scale", scale) : scale;
   const double radius = type == "sky" ? 0 : readSunRadius(parameters);
+  const Rgb sunlight = sunRadiance(turbidity, std::acos(std::min(1.0, sun.y()))) * static_cast<float>(sunScale);
+  if (type != "sky")
+    checkEmission(type == "sunsky" && parameters.has("sun_scale") ? "sun_scale" : "scale",
+                  "the radiance of the sun times scale", sunlight);
   if (type != "sun" && parameters.has("albedo")) {
     parameters.colour("albedo", Rgb::Zero());
     parameters.warn("albedo", "albedo is ignored: Preetham's sky does not depend on the ground");
@@ -123,7 +127,10 @@ bool DaylightReader::read(pugi::xml_node node, const Parameters& parameters, con
   if (context_.file.isOfToday())
     context_.note(fmt::format("{}: the zenith is +y, as in Mitsuba 0.6; in Mitsuba 3 it is +z", describe(node)));
   // Nothing is stored before everything has been read, because an element that throws is read again.
-  if (!any()) frame_ = toWorld;
+  if (!any()) {
+    frame_ = toWorld;
+    location_ = SceneFile::location(node);
+  }
   width_ = std::max(width_, width);
   if (type != "sun") {
     if (turbidity < PreethamSky::kLowestTurbidity)
@@ -132,10 +139,7 @@ bool DaylightReader::read(pugi::xml_node node, const Parameters& parameters, con
     const double clearest = std::max(turbidity, PreethamSky::kLowestTurbidity);
     parts_.skies.push_back({PreethamSky(clearest, sun), toWorld, skyScale, stretch});
   }
-  if (type != "sky") {
-    const Rgb radiance = sunRadiance(turbidity, std::acos(std::min(1.0, sun.y()))) * static_cast<float>(sunScale);
-    addSun(toWorld * stretched(sun, stretch), radiance, radius);
-  }
+  if (type != "sky") addSun(toWorld * stretched(sun, stretch), sunlight, radius);
   return true;
 }
 
@@ -150,7 +154,15 @@ void DaylightReader::addSun(const Eigen::Vector3d& world, const Rgb& radiance, d
 
 void DaylightReader::finish() {
   if (parts_.skies.empty() && parts_.suns.empty()) return;
-  if (context_.options.geometry) context_.scene.environment = bakeDaylight(parts_, frame_, width_);
+  if (!context_.options.geometry) return;
+  Environment environment = bakeDaylight(parts_, frame_, width_);
+  const auto isTooLarge = [](const Rgb& pixel) { return !(pixel <= kLargestEmission).all(); };
+  if (std::ranges::any_of(environment.radiance.pixels, isTooLarge)) {
+    const std::string message =
+        fmt::format("the radiance of all skies and suns together must not be over {:g}", kLargestEmission);
+    return context_.unsupported(location_, message, message, "they are left out");
+  }
+  context_.scene.environment = std::move(environment);
 }
 
 }  // namespace lobe

@@ -26,6 +26,7 @@ class DaylightReader {
   ReadContext& context_;
   DaylightParts parts_;
   Eigen::Matrix3d frame_ = Eigen::Matrix3d::Identity();  // of the first emitter: the frame of the image
+  std::ptrdiff_t location_ = 0;                          // of the first emitter
   int width_ = 0;
 };
 

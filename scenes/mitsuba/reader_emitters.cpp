@@ -19,7 +19,9 @@ namespace {
 
 Environment makeConstant(const Parameters& parameters) {
   const auto scale = static_cast<float>(emissionScale(parameters, "scale", 1.0));
-  return {Image(1, 1, emission(parameters, "radiance", grey(1.0f)) * scale)};
+  const Rgb radiance = emission(parameters, "radiance", grey(1.0f)) * scale;
+  checkEmission("scale", "radiance times scale", radiance);
+  return {Image(1, 1, radiance)};
 }
 
 std::optional<Environment> makeFromImage(ReadContext& context, TextureReader& textures, pugi::xml_node node,
@@ -71,14 +73,16 @@ ProjectedTexture makeProjected(TexturePtr texture, const Eigen::Matrix4f& frame,
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 
-/// The texture fills the square around the cone. cutoff: in degrees.
+/// The texture fills the square around the cone. cutoff: in degrees. intensity: with which it is multiplied.
 std::optional<ProjectedTexture> makeSpotTexture(const Parameters& parameters, const Eigen::Matrix4f& frame,
-                                                double cutoff) {
+                                                double cutoff, const Rgb& intensity) {
   if (!parameters.has("texture")) return std::nullopt;
   if (!(cutoff < 90.0))
     throw ParameterError("texture", fmt::format("a texture needs a cutoff_angle below 90 degrees, not {}", cutoff));
+  TexturePtr texture = emissionTexture(parameters, "texture", grey(1.0f));
+  checkEmission("texture", "intensity times texture", intensity * texture->largest());
   const double perUnit = 0.5 / std::tan(cutoff * kDegree);
-  return makeProjected(emissionTexture(parameters, "texture", grey(1.0f)), frame, perUnit, perUnit);
+  return makeProjected(std::move(texture), frame, perUnit, perUnit);
 }
 
 SpotLight makeSpot(const Parameters& parameters) {
@@ -91,26 +95,28 @@ SpotLight makeSpot(const Parameters& parameters) {
   if (!(beam >= 0.0 && beam <= cutoff))
     throw ParameterError("beam_width",
                          fmt::format("beam_width must be between 0 and the cutoff_angle, {}, not {}", cutoff, beam));
+  const Rgb intensity = emission(parameters, "intensity", grey(1.0f));
   return {frame.topRightCorner<3, 1>(),
           readAxis(parameters, frame.block<3, 1>(0, 2)),
-          emission(parameters, "intensity", grey(1.0f)),
+          intensity,
           static_cast<float>(cutoff * kDegree),
           static_cast<float>(beam * kDegree),
-          makeSpotTexture(parameters, frame, cutoff)};
+          makeSpotTexture(parameters, frame, cutoff, intensity)};
 }
 
 /// Oriented like the view of a camera: the first pixel of the image is at +x and +y.
 ProjectorLight makeProjector(const Parameters& parameters) {
   if (!parameters.has("irradiance")) throw ParameterError("", "the parameter \"irradiance\" is needed");
   TexturePtr irradiance = emissionTexture(parameters, "irradiance", grey(1.0f));
+  const auto scale = static_cast<float>(emissionScale(parameters, "scale", 1.0));
+  checkEmission("scale", "irradiance times scale", irradiance->largest() * scale);
   const auto [width, height] = irradiance->resolution();
   Camera camera;
   readFieldOfView(parameters, camera);
   const double tangent = std::tan(0.5 * horizontalFov(camera, width, height) * kDegree);
   const Eigen::Matrix4f frame = toWorld(parameters);
   const double perX = -0.5 / tangent, perY = perX * width / height;
-  return {frame.topRightCorner<3, 1>(), readAxis(parameters, frame.block<3, 1>(0, 2)),
-          static_cast<float>(emissionScale(parameters, "scale", 1.0)),
+  return {frame.topRightCorner<3, 1>(), readAxis(parameters, frame.block<3, 1>(0, 2)), scale,
           makeProjected(std::move(irradiance), frame, perX, perY)};
 }
 

@@ -130,6 +130,36 @@ TEST_CASE("scenes: invalid emitters are rejected") {
   checkFault(fault("point", "<float name=\"power\" value=\"1\"/>"), "3:3", {"\"power\"", "intensity"});
 }
 
+TEST_CASE("scenes: emission over the limit is rejected, also that of products and of parts of a texture") {
+  const auto fault = [](const std::string& type, const std::string& body) {
+    return faultOf("<emitter type=\"" + type + "\">\n" + body + "</emitter>");
+  };
+  const auto number = [](const std::string& name, const std::string& value) {
+    return "<float name=\"" + name + "\" value=\"" + value + "\"/>\n";
+  };
+  const auto texture = [&](const std::string& name, const std::string& value) {
+    return "<texture name=\"" + name + "\" type=\"checkerboard\">" + number("color0", value) + number("color1", "0") +
+           "</texture>";
+  };
+  const std::string limit = "over 1e+30";
+  checkFault(fault("constant", number("radiance", "1e20") + number("scale", "1e20")), "4:1", {"radiance times", limit});
+  CHECK(fault("constant", number("radiance", "1e15") + number("scale", "1e14")).empty());
+  // The mean of the checkerboard is within the limit.
+  checkFault(
+      faultOf("<shape type=\"disk\"><emitter type=\"area\">\n" + texture("radiance", "1.5e30") + "</emitter></shape>"),
+      "3:1", {"the largest radiance", limit});
+  checkFault(fault("spot", texture("texture", "1e20") + number("intensity", "1e20")), "3:1",
+             {"intensity times texture", limit});
+  checkFault(fault("projector", number("scale", "1e20") + number("fov", "40") + texture("irradiance", "1e20")), "3:1",
+             {"irradiance times scale", limit});
+  const std::string noon = "<vector name=\"sunDirection\" y=\"1\"/>";
+  for (const std::string type : {"sun", "sunsky"})
+    checkFault(fault(type, number("scale", "1e30") + noon), "3:1", {"the radiance of the sun", limit});
+  std::string suns;
+  for (int i = 0; i < 30; ++i) suns += "<emitter type=\"sun\">" + number("scale", "3e25") + noon + "</emitter>";
+  checkFault(faultOf(suns), "2:1", {"all skies and suns together", limit});
+}
+
 TEST_CASE("scenes: invalid skies are rejected") {
   const auto fault = [](const std::string& type, const std::string& body) {
     return faultOf("<emitter type=\"" + type + "\">\n  " + body + "</emitter>");
