@@ -56,6 +56,7 @@ class SunPainter {
     const Eigen::Vector3d other = centre.cross(side);
     const double sine = std::sin(0.5 * sun.radius);
     for (int i = 0; i < parts; ++i) {
+      throwIfCancelled();
       const double below = 2 * sine * sine * (i + 0.5) / parts;  // 1 − cos of the angle from the centre
       const double radius = std::sqrt(below * (2 - below));
       for (int j = 0; j < parts; ++j) {

@@ -29,7 +29,8 @@ struct DaylightParts {
 };
 
 /// The sum of all parts. With bilinear interpolation, the image has exactly the irradiance of each sun, in the pixels
-/// around its disc. toWorld: from the frame of the image. width: in pixels, twice the height.
+/// around its disc. toWorld: from the frame of the image. width: in pixels, twice the height. Throws LoopCancelled in a
+/// task that has been cancelled.
 Environment bakeDaylight(const DaylightParts& parts, const Eigen::Matrix3d& toWorld, int width);
 
 }  // namespace lobe

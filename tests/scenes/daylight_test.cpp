@@ -1,10 +1,13 @@
 // The sun's position, clear sky and sun, and the environment map that is made from them.
 
+#include <chrono>
 #include <cmath>
 #include <numbers>
+#include <thread>
 
 #include <catch2/catch.hpp>
 
+#include "runtime/core/parallel.h"
 #include "scenes/daylight/daylight_image.h"
 #include "scenes/daylight/sun_position.h"
 #include "tests/support/scenes_test_tools.h"
@@ -135,6 +138,27 @@ TEST_CASE("scenes: the environment map has the sun's irradiance for any radius a
   // On the ground, exactly the irradiance times the cosine.
   const Integral sum = integrate(bakeSun({at(60, 123), irradiance, sunRadius()}, 1024).radiance);
   CHECK(sum.ground == Approx(2 * std::cos(60 * kDegree)).epsilon(1e-3));
+}
+
+// All suns would take far longer than the time limit of a test.
+TEST_CASE("scenes: the suns of an environment map end early in a cancelled task") {
+  const std::vector<SunDisc> suns(3000, SunDisc{at(10), Rgb(1, 1, 1), 90 * kDegree});
+  tbb::task_group_context context(tbb::task_group_context::isolated);
+  tbb::task_group group(context);
+  std::thread interruption([&context] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    context.cancel_group_execution();
+  });
+  bool cancelled = false;
+  group.run_and_wait([&] {
+    try {
+      bakeDaylight({{}, suns}, Eigen::Matrix3d::Identity(), 1024);
+    } catch (const LoopCancelled&) {
+      cancelled = true;
+    }
+  });
+  interruption.join();
+  CHECK(cancelled);
 }
 
 TEST_CASE("scenes: the environment map has the irradiance of the sky") {
