@@ -1,5 +1,6 @@
 #include "schema/illumination_file.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
@@ -33,7 +34,7 @@ void checkRecord(const StoredIllumination& r, std::size_t index, std::span<const
   const auto require = [&](bool condition, const char* fault) {
     if (!condition) refuseDamaged(name, fmt::format("record {}: {}", index, fault));
   };
-  require(allFinite({r.position[0], r.position[1], r.position[2], r.radius, r.irradiance, r.samples, r.likelihoodGain}),
+  require(allFinite({r.position[0], r.position[1], r.position[2], r.radius, r.irradiance, r.samples}),
           "a number is not finite");
   // These conditions are false for numbers that are not finite.
   require(isUnit(r.normal) && isUnit(r.tangent) && std::abs(dot(r.normal, r.tangent)) <= kFrameTolerance,
@@ -71,12 +72,17 @@ IlluminationFile::IlluminationFile(FileContent file, const std::filesystem::path
   info_ = readInfo(root);
   records_ = inPlace<StoredIllumination>(*root.records(), name);
   components_ = inPlace<CacheComponent>(*root.components(), name);
+  if (root.likelihood_gains()) likelihoodGains_ = inPlace<float>(*root.likelihood_gains(), name);
   // The look-up divides by the unit, whose inverse would overflow if it were subnormal.
   if (!(info_.unit > 0 && std::isnormal(info_.unit))) refuseDamaged(name, "the unit of length is out of range");
   if (!(info_.undersampledFraction >= 0 && info_.undersampledFraction <= 1))
     refuseDamaged(name, "fraction of undersampled records out of range");
   if (info_.settings.maxDepth < 0) refuseDamaged(name, "maximum length of paths out of range");
   checkComponents(components_, name);
+  if (!likelihoodGains_.empty() && likelihoodGains_.size() != records_.size())
+    refuseDamaged(name, "the number of likelihood gains is not that of the records");
+  if (!std::ranges::all_of(likelihoodGains_, [](float gain) { return std::isfinite(gain); }))
+    refuseDamaged(name, "a likelihood gain is not finite");
   for (std::size_t i = 0; i < records_.size(); ++i) {
     checkRecord(records_[i], i, components_, name);
     // The cell size of the look-up follows from the unit, so that a much larger radius would exhaust the memory.
@@ -94,8 +100,9 @@ IlluminationFile IlluminationFile::parse(std::span<const std::byte> bytes, const
 }
 
 std::vector<std::byte> encodeIllumination(const IlluminationInfo& info, std::span<const StoredIllumination> records,
-                                          std::span<const CacheComponent> components) {
-  const std::size_t vectors = records.size_bytes() + components.size_bytes();
+                                          std::span<const CacheComponent> components,
+                                          std::span<const float> likelihoodGains) {
+  const std::size_t vectors = records.size_bytes() + components.size_bytes() + likelihoodGains.size_bytes();
   flatbuffers::FlatBufferBuilder builder(bufferSize(vectors, "the records of the illumination"));
   const StoredTrainingSettings& s = info.settings;
   const auto settings = fb::CreateTrainingSettings(builder, builder.CreateString(s.from), s.passes, s.photons,
@@ -106,8 +113,10 @@ std::vector<std::byte> encodeIllumination(const IlluminationInfo& info, std::spa
       builder.CreateVectorOfStructs(reinterpret_cast<const fb::IlluminationRecord*>(records.data()), records.size());
   const auto componentVector =
       builder.CreateVectorOfStructs(reinterpret_cast<const fb::Component*>(components.data()), components.size());
+  const auto gainVector = builder.CreateVector(likelihoodGains.data(), likelihoodGains.size());
   builder.Finish(fb::CreateIllumination(builder, toolVersion, scene, info.sceneHash, settings, info.particles,
-                                        info.undersampledFraction, info.unit, recordVector, componentVector));
+                                        info.undersampledFraction, info.unit, recordVector, componentVector,
+                                        gainVector));
   return wrapPayload(kIlluminationFormat, std::as_bytes(std::span(builder.GetBufferPointer(), builder.GetSize())));
 }
 

@@ -13,14 +13,14 @@
 
 namespace lobe {
 
-inline constexpr FileFormat kIlluminationFormat{{'I', 'L', 'L', 'U'}, 3, 0};
+inline constexpr FileFormat kIlluminationFormat{{'I', 'L', 'L', 'U'}, 2, 3};
 
 /// A record, read in place: the layout equals that of the schema (size checked at compile time, order of the fields by
 /// a test). A new field must be added here, to illumination.fbs, to the checks in illumination_file.cpp, and to
 /// runtime/guiding/illumination_store.cpp.
 struct StoredIllumination {
   std::array<float, 3> position, normal, tangent;
-  float radius, background, irradiance, samples, bsdfFraction, likelihoodGain;
+  float radius, background, irradiance, samples, bsdfFraction;
   std::uint32_t first, count;
 };
 
@@ -62,6 +62,10 @@ class IlluminationFile {
   std::span<const CacheComponent> components(const StoredIllumination& r) const {
     return components_.subspan(r.first, r.count);
   }
+  /// Of one of records(); see illumination.fbs. 0 if not known.
+  float likelihoodGain(const StoredIllumination& r) const {
+    return likelihoodGains_.empty() ? 0 : likelihoodGains_[static_cast<std::size_t>(&r - records_.data())];
+  }
   const ContainerHeader& header() const { return header_; }
   std::size_t bytes() const { return file_.bytes().size(); }
 
@@ -71,11 +75,14 @@ class IlluminationFile {
   IlluminationInfo info_;
   std::span<const StoredIllumination> records_;
   std::span<const CacheComponent> components_;
+  std::span<const float> likelihoodGains_;  // one for each record, or none
   ContainerHeader header_{};
 };
 
-/// The bytes of a file. Equal input gives equal bytes. Throws std::runtime_error if they are too many for the format.
+/// The bytes of a file. likelihoodGains: one for each record, or none. Equal input gives equal bytes. Throws
+/// std::runtime_error if they are too many for the format.
 std::vector<std::byte> encodeIllumination(const IlluminationInfo& info, std::span<const StoredIllumination> records,
-                                          std::span<const CacheComponent> components);
+                                          std::span<const CacheComponent> components,
+                                          std::span<const float> likelihoodGains = {});
 
 }  // namespace lobe

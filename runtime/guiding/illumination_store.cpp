@@ -24,12 +24,12 @@ StoredIllumination stored(const IlluminationRecord& r, std::size_t first) {
           .irradiance = r.irradiance,
           .samples = r.samples,
           .bsdfFraction = r.bsdfFraction,
-          .likelihoodGain = r.likelihoodGain,
           .first = static_cast<std::uint32_t>(first),
           .count = static_cast<std::uint32_t>(r.count)};
 }
 
-IlluminationRecord loaded(const StoredIllumination& s, std::span<const CacheComponent> components) {
+IlluminationRecord loaded(const StoredIllumination& s, float likelihoodGain,
+                          std::span<const CacheComponent> components) {
   IlluminationRecord record{.position = loaded(s.position),
                             .normal = loaded(s.normal),
                             .tangent = loaded(s.tangent),
@@ -38,7 +38,7 @@ IlluminationRecord loaded(const StoredIllumination& s, std::span<const CacheComp
                             .irradiance = s.irradiance,
                             .samples = s.samples,
                             .bsdfFraction = s.bsdfFraction,
-                            .likelihoodGain = s.likelihoodGain,
+                            .likelihoodGain = likelihoodGain,
                             .count = static_cast<std::int32_t>(s.count),
                             .components = {}};
   std::ranges::transform(components, record.components.begin(), [](const CacheComponent& c) {
@@ -52,19 +52,22 @@ IlluminationRecord loaded(const StoredIllumination& s, std::span<const CacheComp
 std::vector<std::byte> storeIllumination(const IlluminationCache& cache, IlluminationInfo info) {
   std::vector<StoredIllumination> records;
   std::vector<CacheComponent> components;
+  std::vector<float> likelihoodGains;
   for (const IlluminationRecord& r : cache.records()) {
     records.push_back(stored(r, components.size()));
+    likelihoodGains.push_back(r.likelihoodGain);
     for (const Gaussian& g : r.gaussians())
       components.push_back({g.weight, g.meanX, g.meanY, g.cov.xx, g.cov.xy, g.cov.yy});
   }
   info.unit = cache.unit();
-  return encodeIllumination(info, records, components);
+  return encodeIllumination(info, records, components, likelihoodGains);
 }
 
 IlluminationCache loadIllumination(const IlluminationFile& file) {
   std::vector<IlluminationRecord> records;
   records.reserve(file.records().size());
-  for (const StoredIllumination& s : file.records()) records.push_back(loaded(s, file.components(s)));
+  for (const StoredIllumination& s : file.records())
+    records.push_back(loaded(s, file.likelihoodGain(s), file.components(s)));
   return {records, file.info().unit};
 }
 

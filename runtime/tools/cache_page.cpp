@@ -229,8 +229,9 @@ Json illuminationJson(const IlluminationFile& file, const std::string& path) {
   for (const StoredIllumination& r : file.records()) {
     for (const auto& vector : {r.position, r.normal, r.tangent})
       numbers.insert(numbers.end(), vector.begin(), vector.end());
-    numbers.insert(numbers.end(), {r.radius, r.background, r.irradiance, r.samples, r.bsdfFraction, r.likelihoodGain,
-                                   static_cast<float>(components.size()), static_cast<float>(r.count)});
+    numbers.insert(numbers.end(),
+                   {r.radius, r.background, r.irradiance, r.samples, r.bsdfFraction, file.likelihoodGain(r),
+                    static_cast<float>(components.size()), static_cast<float>(r.count)});
     const std::span<const CacheComponent> ofRecord = file.components(r);
     components.insert(components.end(), ofRecord.begin(), ofRecord.end());
   }

@@ -47,7 +47,7 @@ std::vector<Distribution> distributions(const IlluminationFile& file) {
           distributionOf(file, "samples", [](const auto& r) { return r.samples; }),
           distributionOf(file, "background", [](const auto& r) { return r.background; }),
           distributionOf(file, "bsdf_fraction", [](const auto& r) { return r.bsdfFraction; }),
-          distributionOf(file, "likelihood_gain", [](const auto& r) { return r.likelihoodGain; }),
+          distributionOf(file, "likelihood_gain", [&](const auto& r) { return file.likelihoodGain(r); }),
           distributionOf(file, "irradiance", [](const auto& r) { return r.irradiance; }),
           distributionOf(file, "components", [](const auto& r) { return r.count; })};
 }
@@ -65,7 +65,7 @@ Json recordJson(const IlluminationFile& file, const StoredIllumination& r) {
             {"irradiance", shortNumber(r.irradiance)},
             {"samples", shortNumber(r.samples)},
             {"bsdf_fraction", shortNumber(r.bsdfFraction)},
-            {"likelihood_gain", shortNumber(r.likelihoodGain)},
+            {"likelihood_gain", shortNumber(file.likelihoodGain(r))},
             {"components", Json::array()}};
   for (const CacheComponent& c : file.components(r)) json["components"].push_back(componentJson(c));
   return json;
@@ -143,7 +143,7 @@ void printRecords(const IlluminationFile& file, std::FILE* out) {
   for (std::size_t i = 0; i < file.records().size(); ++i) {
     const StoredIllumination& r = file.records()[i];
     table.add({std::to_string(i), vectorText(r.position), vectorText(r.normal), fmt::format("{:.4g}", r.radius),
-               fmt::format("{:.0f}", r.samples), fmt::format("{:.2f}", r.likelihoodGain),
+               fmt::format("{:.0f}", r.samples), fmt::format("{:.2f}", file.likelihoodGain(r)),
                fmt::format("{:.3f}", r.background), std::to_string(r.count)});
   }
   table.print(out);
@@ -157,9 +157,9 @@ void writePoints(const IlluminationFile& file, const std::filesystem::path& out)
     text += fmt::format("property float {}\n", property);
   text += "end_header\n";
   for (const StoredIllumination& r : file.records()) {
-    const std::array<float, 11> vertex{r.position[0], r.position[1],  r.position[2],   r.normal[0],
-                                       r.normal[1],   r.normal[2],    r.radius,        r.samples,
-                                       r.background,  r.bsdfFraction, r.likelihoodGain};
+    const std::array<float, 11> vertex{
+        r.position[0], r.position[1], r.position[2], r.normal[0],    r.normal[1],           r.normal[2],
+        r.radius,      r.samples,     r.background,  r.bsdfFraction, file.likelihoodGain(r)};
     text.append(reinterpret_cast<const char*>(vertex.data()), sizeof(vertex));
   }
   writeAtomically(out, text);

@@ -55,5 +55,6 @@ TEST_CASE("fixtures: illumination of version 0.2") {
   CHECK(r.position.x() == Approx(0.707567).epsilon(1e-5));
   CHECK(r.irradiance == Approx(4363.52).epsilon(1e-5));
   CHECK(r.background == Approx(0.903197).epsilon(1e-5));
+  CHECK(r.likelihoodGain == 0);  // such files do not have it
   CHECK(r.components[0].meanX == Approx(0.14799).epsilon(1e-4));
 }

@@ -18,15 +18,17 @@ struct Content {
   IlluminationInfo info;
   std::vector<StoredIllumination> records;
   std::vector<CacheComponent> components;
-  std::vector<std::byte> encode() const { return encodeIllumination(info, records, components); }
+  std::vector<float> likelihoodGains;
+  std::vector<std::byte> encode() const { return encodeIllumination(info, records, components, likelihoodGains); }
 };
 
 Content smallFile() {
   Content c;
   c.info = {"0.1.0", "house/scene.xml", 0x0123456789abcdef, {"photons", 3, 1000, 500, 8, 7, true, 6}, 2500, 0.25, 0.5f};
-  c.records = {{{1, 2, 3}, {0, 0, 1}, {1, 0, 0}, 0.5f, 0.25f, 3.5f, 100, 0.3f, 1.5f, 0, 2},
-               {{-1, 0, 5}, {0, 1, 0}, {0, 0, -1}, 0.125f, 1.0f, 0, 0, 0.9f, -0.25f, 2, 0}};
+  c.records = {{{1, 2, 3}, {0, 0, 1}, {1, 0, 0}, 0.5f, 0.25f, 3.5f, 100, 0.3f, 0, 2},
+               {{-1, 0, 5}, {0, 1, 0}, {0, 0, -1}, 0.125f, 1.0f, 0, 0, 0.9f, 2, 0}};
   c.components = {{0.25f, -0.1f, 0.3f, 0.02f, 0.0f, 0.05f}, {0.75f, 0.4f, -0.2f, 0.01f, -0.005f, 0.06f}};
+  c.likelihoodGains = {1.5f, -0.25f};
   return c;
 }
 
@@ -62,22 +64,24 @@ TEST_CASE("schema: an illumination file reads back as written") {
   const auto mixture = file.components(file.records()[0]);
   CHECK(std::ranges::equal(std::as_bytes(mixture), std::as_bytes(std::span(c.components))));
   CHECK(file.components(file.records()[1]).empty());
+  CHECK((file.likelihoodGain(file.records()[0]) == 1.5f && file.likelihoodGain(file.records()[1]) == -0.25f));
   CHECK(file.bytes() == c.encode().size());
 }
 
 TEST_CASE("schema: the layout of illumination records matches the FlatBuffers schema") {
-  const StoredIllumination r{{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, 10, 11, 12, 13, 14, 15, 16, 17};
+  const StoredIllumination r{{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, 10, 11, 12, 13, 14, 15, 16};
   const auto f = std::bit_cast<fb::IlluminationRecord>(r);
   CHECK((f.position().x() == 1 && f.position().y() == 2 && f.position().z() == 3));
   CHECK((f.normal().x() == 4 && f.normal().z() == 6 && f.tangent().x() == 7 && f.tangent().z() == 9));
   CHECK((f.radius() == 10 && f.background() == 11 && f.irradiance() == 12 && f.samples() == 13 &&
-         f.bsdf_fraction() == 14 && f.likelihood_gain() == 15 && f.first() == 16 && f.count() == 17));
+         f.bsdf_fraction() == 14 && f.first() == 15 && f.count() == 16));
 }
 
 TEST_CASE("schema: an illumination file without records is valid") {
   Content c = smallFile();
   c.records.clear();
   c.components.clear();
+  c.likelihoodGains.clear();
   CHECK(Opener().fault(c.encode()).empty());
 }
 
@@ -151,7 +155,8 @@ TEST_CASE("schema: invalid values in illumination files are rejected") {
       {"background", [&](Content& c) { c.records[1].background = nan; }},
       {"negative irradiance", [](Content& c) { c.records[1].irradiance = -1; }},
       {"not finite", [&](Content& c) { c.records[1].irradiance = infinity; }},
-      {"not finite", [&](Content& c) { c.records[1].likelihoodGain = nan; }},
+      {"a likelihood gain is not finite", [&](Content& c) { c.likelihoodGains[1] = nan; }},
+      {"number of likelihood gains", [](Content& c) { c.likelihoodGains.pop_back(); }},
       {"number of samples", [](Content& c) { c.records[1].samples = -1; }},
       {"no components", [](Content& c) { c.records[1].count = 0, c.records[1].background = 0.9f; }},
       {"BSDF sampling fraction", [](Content& c) { c.records[1].bsdfFraction = 0; }},

@@ -201,7 +201,7 @@ def check_light(driver, folder):
     page = Page(driver, folder / "light.html")
     assert "likelihood gain" in page.text("map-scale") and "in nats" in page.text("map-scale"), page.text("map-scale")
     gains = driver.execute_script("return view.records.map(record => record.gain).filter(gain => gain !== null)")
-    assert sum(gain > 0 for gain in gains) > len(gains) / 2, "most mixtures predict the light worse than cosine-weighted sampling"
+    assert min(gains) < 0 < max(gains), "the gains of few particles should have both signs"
     for act in (lambda: page.find("map").send_keys(Keys.ARROW_LEFT), lambda: page.find("map").send_keys("+"),
                 lambda: page.find("zoom-in").click(), lambda: page.find("zoom-out").click(),
                 lambda: page.point("map", .2, .2).click_and_hold().move_by_offset(60, 20).release().perform(),
