@@ -156,10 +156,17 @@ void SampleStorage::merge(SampleStorage&& other) {
 }
 
 void SampleStorage::merge(std::span<SampleStorage> others) {
-  std::vector<SampleStorageData*> data;
-  for (SampleStorage& other : others)
-    if (&other != this) data.push_back(other.data_.get());
-  isolated([&] { data_->append(data); });
+  try {
+    std::vector<SampleStorageData*> data;
+    for (SampleStorage& other : others)
+      if (&other != this) data.push_back(other.data_.get());
+    isolated([&] { data_->append(data); });
+  } catch (...) {
+    // The paths may refer to samples that have not been appended.
+    clear();
+    for (SampleStorage& other : others) other.clear();
+    throw;
+  }
 }
 
 std::size_t SampleStorage::particles() const {

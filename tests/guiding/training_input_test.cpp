@@ -5,6 +5,7 @@
 #include <array>
 #include <set>
 
+#include <tbb/task_group.h>
 #include <catch2/catch.hpp>
 
 #include "runtime/core/random.h"
@@ -90,6 +91,28 @@ TEST_CASE("guiding: sample storages can be merged one at a time or all at once, 
     CHECK(!dataOf(all).isInOrder());
     CHECK(contentOf(dataOf(all).inOrder()) == expected);
   }
+}
+
+TEST_CASE("guiding: a merge that is cancelled leaves the storages empty and usable") {
+  SampleStorage all = randomStorage(9);
+  std::vector<SampleStorage> parts;
+  for (std::uint64_t seed = 0; seed < 6; ++seed) parts.push_back(randomStorage(seed));
+  tbb::task_group group;
+  bool thrown = false;
+  group.run([&] {
+    group.cancel();
+    try {
+      all.merge(parts);
+    } catch (const std::runtime_error&) {
+      thrown = true;
+    }
+  });
+  group.wait();
+  REQUIRE(thrown);
+  CHECK((dataOf(all).paths.empty() && all.particles() == 0));
+  CHECK(std::ranges::all_of(parts, [](const SampleStorage& s) { return s.particles() == 0; }));
+  all.merge(randomStorage(9));
+  CHECK(contentOf(dataOf(all)) == contentOf(dataOf(randomStorage(9))));
 }
 
 TEST_CASE("guiding: a tree of particles finds every particle within the distance") {

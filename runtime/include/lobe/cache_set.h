@@ -22,7 +22,7 @@ struct LobeRequest {
 };
 
 /// The BRDF caches, read into memory: later changes of the files have no effect. Immutable: all functions may be called
-/// from any thread. Copies share their memory.
+/// from any thread. Copies share their memory. After a move, a set may only be assigned to or destroyed.
 class LobeCacheSet {
  public:
   /// Reads the file of every request from the folder; requests for equal lobes share one file. `reduction` ≥ 0: the

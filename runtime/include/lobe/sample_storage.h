@@ -15,7 +15,7 @@ struct ShadingPoint;
 
 /// Holds particles, requests for records and samples for the BSDF sampling fraction. Not thread-safe: use one storage
 /// per thread and merge them. Field::update sorts the samples by the index of their path, so that the result does not
-/// depend on which thread traced which path.
+/// depend on which thread traced which path. After a move, a storage may only be assigned to or destroyed.
 class SampleStorage {
  public:
   SampleStorage();
@@ -52,7 +52,7 @@ class SampleStorage {
   void merge(SampleStorage&& other);
   /// Appends the contents of other storages in their order, in parallel, and leaves those empty. This storage may be
   /// one of them: it keeps its content, and the others are appended. Like the functions of Field, uses oneTBB in the
-  /// task arena of the calling thread. After an exception, the contents are incomplete.
+  /// task arena of the calling thread. After an exception, all of them are empty.
   void merge(std::span<SampleStorage> others);
 
   /// Number of particles, from photons and camera paths.
