@@ -209,13 +209,31 @@ class AdaptiveFitter {
     return static_cast<std::uint32_t>(nearest - references_.begin());
   }
 
+  /// The nearest record; nullopt if there is none that has components.
+  std::optional<std::uint32_t> nearestMixture(const Vec3& wo) const {
+    if (records_.empty()) return std::nullopt;
+    const std::uint32_t found = nearestRecord(wo);
+    return records_[found].mixture.empty() ? std::nullopt : std::optional(found);
+  }
+
   std::optional<Fit> fitWhereNeeded(int entry) const {
     const Vec3 wo = grid_.direction(entry);
-    if (records_.empty()) {
-      const DirectionFits fits(lobe_, wo, settings_);
-      return Fit{fits.fewest(), fits.target()};
+    const std::optional<std::uint32_t> neighbour = nearestMixture(wo);
+    try {
+      return neighbour ? fitUnlessServed(wo, *neighbour) : fitAlone(wo);
+    } catch (const TooNarrow&) {
+      // A record without components serves it, too.
+      if (!neighbour && !records_.empty()) return std::nullopt;
+      return Fit{withoutComponents(lobe_, wo, settings_.samples), 0};
     }
-    const std::uint32_t found = nearestRecord(wo);
+  }
+
+  Fit fitAlone(const Vec3& wo) const {
+    const DirectionFits fits(lobe_, wo, settings_);
+    return {fits.fewest(), fits.target()};
+  }
+
+  std::optional<Fit> fitUnlessServed(const Vec3& wo, std::uint32_t found) const {
     const FittedRecord& neighbour = records_[found];
     Mixture aligned(neighbour.mixture.size());
     alignMixture({grid_.kind, references_[found], {}}, neighbour.mixture, wo, aligned);

@@ -32,31 +32,33 @@ double discIntegral(int resolution, const F& f) {
 /// A constant over the hemisphere, or over a small circle about (0.3, 0) on the disc.
 class TestLobe : public Lobe {
  public:
-  explicit TestLobe(double value, bool samples = true, float radius = 1)
-      : value_(value), samples_(samples), radius_(radius) {}
+  /// Its radius on the disc is grazingRadius for directions more than 60° from the normal; 0: the same.
+  explicit TestLobe(double value, bool samples = true, float radius = 1, float grazingRadius = 0)
+      : value_(value), samples_(samples), radius_(radius), grazingRadius_(grazingRadius > 0 ? grazingRadius : radius) {}
   LobeKind kind() const override { return LobeKind::isotropic; }
   std::string model() const override { return "test"; }
   std::string key() const override { return "test"; }
   std::string summary() const override { return "a test lobe"; }
   int revision() const override { return 1; }
-  double eval(const Vec3&, const Vec3& wi) const override { return pdf({}, wi) > 0 ? value_ : 0; }
-  std::optional<LobeSample> sample(const Vec3&, const Vec2& u) const override {
+  double eval(const Vec3& wo, const Vec3& wi) const override { return pdf(wo, wi) > 0 ? value_ : 0; }
+  std::optional<LobeSample> sample(const Vec3& wo, const Vec2& u) const override {
     if (!samples_) return std::nullopt;
-    const float r = radius_ * std::sqrt(u.x()), phi = 6.2831853f * u.y();
+    const float r = radius(wo) * std::sqrt(u.x()), phi = 6.2831853f * u.y();
     const Vec3 wi = fromDisc(centre() + r * Vec2(std::cos(phi), std::sin(phi)));
-    return LobeSample{wi, pdf({}, wi)};
+    return LobeSample{wi, pdf(wo, wi)};
   }
-  float pdf(const Vec3&, const Vec3& wi) const override {
+  float pdf(const Vec3& wo, const Vec3& wi) const override {
     // The factor allows for rounding of directions.
-    const bool inside = wi.z() > 0 && (toDisc(wi) - centre()).norm() < 1.1f * radius_;
-    return inside ? 0.15915494f / (radius_ * radius_) : 0;
+    const bool inside = wi.z() > 0 && (toDisc(wi) - centre()).norm() < 1.1f * radius(wo);
+    return inside ? 0.15915494f / (radius(wo) * radius(wo)) : 0;
   }
 
  private:
   Vec2 centre() const { return radius_ < 1 ? Vec2(0.3f, 0) : Vec2(0, 0); }
+  float radius(const Vec3& wo) const { return wo.z() < 0.5f ? grazingRadius_ : radius_; }
   double value_;
   bool samples_;
-  float radius_;
+  float radius_, grazingRadius_;
 };
 
 }  // namespace
@@ -216,6 +218,14 @@ TEST_CASE("fitter: directions of a fixed grid for which a lobe is too narrow get
     CHECK(fit.components.empty());
     for (const CacheRecord& r : fit.records) CHECK((r.count == 0 && r.cosineMass == 0 && r.albedo > 0));
   }
+}
+
+TEST_CASE("fitter: adaptive fits leave directions for which a lobe is too narrow to BSDF sampling") {
+  const DirectionGrid grid{GridKind::elevation, 16};
+  const FittedGrid fit = fitGrid(TestLobe(1, true, 0.3f, 5e-6f), grid, defaultFitSettings());
+  REQUIRE(fit.records.size() > 1);
+  for (const CacheRecord& r : fit.records)
+    CHECK((r.count > 0) == (grid.direction(static_cast<int>(r.entry)).z() >= 0.5f));
 }
 
 TEST_CASE("fitter: look-up rotates and translates mixtures towards the query in the right direction") {
