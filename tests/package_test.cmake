@@ -11,7 +11,7 @@ run(${CMAKE_COMMAND} -S ${LOBE} -B ${work}/lobe -G Ninja -DCMAKE_BUILD_TYPE=Rele
     -DLOBE_BUILD_TESTS=OFF "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG")
 run(${CMAKE_COMMAND} --build ${work}/lobe)
 run(${CMAKE_COMMAND} --install ${work}/lobe --prefix ${work}/prefix)
-run(${CMAKE_COMMAND} -S ${LOBE}/examples/minimal_path_tracer -B ${work}/example -DCMAKE_BUILD_TYPE=Release
+run(${CMAKE_COMMAND} -S ${LOBE}/examples/minimal_path_tracer -B ${work}/example -G Ninja -DCMAKE_BUILD_TYPE=Release
     -DCMAKE_PREFIX_PATH=${work}/prefix)
 run(${CMAKE_COMMAND} --build ${work}/example)
 run(${work}/example/minimal_path_tracer)

@@ -41,6 +41,8 @@ def check(root, tools):
 
     for tool in ("lobefit", "lobedump", "loberender", "lobecompare"):
         assert f"Usage: {tool}" in run(tool, "--help"), f"{tool} has another name in the bundle"
+    licences = root / prefix.lstrip("/") / "../share/licenses"
+    assert (licences / "lobe").exists() and (licences / "common/LGPL-2.1").exists(), "licences of the libraries are missing"
     run("lobefit", "/data/room.xml", "-o", "/lobes", *FIT)
     run("loberender", "/data/room.xml", "--cache", "/lobes", "-o", "/room.exr", *RENDER)
     assert "lobe" in run("lobedump", *(f"/lobes/{file.name}" for file in (root / "lobes").iterdir()))
