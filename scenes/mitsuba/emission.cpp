@@ -12,7 +12,7 @@ void checkEmission(const char* name, std::string_view what, const Rgb& colour) {
 }
 
 Rgb emission(const Parameters& parameters, const char* name, const Rgb& fallback) {
-  const Rgb colour = parameters.colour(name, fallback);
+  Rgb colour = parameters.colour(name, fallback);
   checkEmission(name, name, colour);
   return colour;
 }

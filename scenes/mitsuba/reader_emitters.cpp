@@ -44,7 +44,7 @@ std::optional<Environment> makeFromImage(ReadContext& context, TextureReader& te
 Vec3 readPosition(const Parameters& parameters) {
   if (!parameters.has("position")) return placeInWorld(parameters).topRightCorner<3, 1>();
   if (parameters.has("to_world")) throw ParameterError("to_world", "give either position or to_world");
-  const Vec3 position = parameters.colour("position", Rgb::Zero()).matrix();
+  Vec3 position = parameters.colour("position", Rgb::Zero()).matrix();
   requireInRange(position, "position");
   return position;
 }

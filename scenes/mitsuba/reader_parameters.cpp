@@ -182,7 +182,7 @@ void requireInRange(const Vec3& position, const char* name) {
 }
 
 Eigen::Matrix4f placeInWorld(const Parameters& parameters) {
-  const Eigen::Matrix4f placed = toWorld(parameters);
+  Eigen::Matrix4f placed = toWorld(parameters);
   requireInRange(placed.topRightCorner<3, 1>(), "to_world");
   return placed;
 }

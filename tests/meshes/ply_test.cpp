@@ -138,7 +138,7 @@ TEST_CASE("scenes: PLY texture coordinates of faces are read") {
 TEST_CASE("scenes: malformed PLY files are rejected with their name") {
   const Folder folder;
   const auto fault = [&folder](const std::string& bytes) {
-    const std::string what = faultOfReading([&] { readPly(folder.write("bad.ply", bytes), {}); });
+    std::string what = faultOfReading([&] { readPly(folder.write("bad.ply", bytes), {}); });
     REQUIRE_THAT(what, Contains("bad.ply: ") && !Contains("\n"));
     return what;
   };

@@ -50,7 +50,8 @@ TEST_CASE("bidirectional: every kind of light gives the image of path tracing", 
 TEST_CASE("bidirectional: an environment with a bright spot gives the image of path tracing") {
   Scene scene = sceneWith(kFloor);
   scene.environment = brightSpot();
-  CHECK(agreesWithPath(Stage(std::move(scene))));
+  const Stage stage(std::move(scene));
+  CHECK(agreesWithPath(stage));
 }
 
 TEST_CASE("bidirectional: every kind of surface gives the image of path tracing", "[slow]") {
@@ -93,7 +94,8 @@ TEST_CASE("bidirectional: interpolated normals give the image of path tracing") 
   addShape(scene, sphereMesh({0.8f, -0.3f, 1}, 0.9f, 4),
            addMaterial(scene, std::make_shared<HalfMirror>(0.5f, 0.3f, 0.4f)));
   addShape(scene, sphereMesh({-1.3f, 0.3f, 1.6f}, 0.6f, 3), addMaterial(scene, std::make_shared<Diffuse>(0.7f)));
-  CHECK(agreesWithPath(Stage(std::move(scene))));
+  const Stage stage(std::move(scene));
+  CHECK(agreesWithPath(stage));
 }
 
 TEST_CASE("bidirectional: shading normals inside glass give the image of path tracing", "[slow]") {

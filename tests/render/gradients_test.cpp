@@ -176,11 +176,11 @@ TEST_CASE("gradients: L1 ignores an outlier, and both norms reproduce consistent
   const auto error = [&](ReconstructionNorm norm) {
     const Image image = reconstruct(pixels, dx, dy, norm);
     float worst = 0;
-    for (std::size_t i = 0; i < image.pixels.size(); ++i)
-      worst = std::max(worst, (image.pixels[i] - Rgb(1.0f + 0.1f * static_cast<float>(i % width),
-                                                     2.0f - 0.05f * static_cast<float>(i / width), 1.5f))
-                                  .abs()
-                                  .maxCoeff());
+    for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+      const std::size_t column = i % width, row = i / width;
+      const Rgb expected(1.0f + 0.1f * static_cast<float>(column), 2.0f - 0.05f * static_cast<float>(row), 1.5f);
+      worst = std::max(worst, (image.pixels[i] - expected).abs().maxCoeff());
+    }
     return worst;
   };
   CHECK(error(ReconstructionNorm::l2) < 1e-4);
