@@ -103,6 +103,7 @@ TEST_CASE("fitter: caches of a newer format and those that cannot be read are ke
     CHECK(readFile(path) == before);
   };
 
+#if !defined(__SANITIZE_ADDRESS__)  // the sanitizers need files themselves, for checks of virtual bases
   rlimit files{};
   getrlimit(RLIMIT_NOFILE, &files);
   const rlimit none{0, files.rlim_max};
@@ -110,6 +111,7 @@ TEST_CASE("fitter: caches of a newer format and those that cannot be read are ke
   const CompileJob unreadable = planCompile(uses, options)[0];
   setrlimit(RLIMIT_NOFILE, &files);
   checkKept(unreadable, "cannot open");
+#endif
 
   std::string newer = sound, older = sound;
   newer[8] = static_cast<char>(kLobeFormat.major + 1);
