@@ -16,8 +16,8 @@ namespace lobe {
 inline constexpr FileFormat kIlluminationFormat{{'I', 'L', 'L', 'U'}, 2, 3};
 
 /// A record, read in place: the layout equals that of the schema (size checked at compile time, order of the fields by
-/// a test). A new field must be added here, to illumination.fbs, to the checks in illumination_file.cpp, and to
-/// runtime/guiding/illumination_store.cpp.
+/// a test). Its size must not change, because files of the same major version would become unreadable: a further
+/// quantity is a vector of its own, like IlluminationFile::likelihoodGain.
 struct StoredIllumination {
   std::array<float, 3> position, normal, tangent;
   float radius, background, irradiance, samples, bsdfFraction;
